@@ -1,4 +1,4 @@
-"""Types of arrays: double precision, indices, 64-bit integers, booleans; and the state of a structure."""
+"""Types of arrays: double precision, indices, 64-bit integers, booleans; and what a structure's are."""
 
 from typing import Annotated
 
@@ -10,6 +10,8 @@ Ints = NDArray[np.intp]
 Longs = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 State = Annotated[Floats, "(N, 3) node positions [m] and twist angles [rad]"]
+Forces = Annotated[Floats, "(N, 3) on nodes [N] and on twist angles [N m]"]
+NodePositions = Annotated[Floats, "(n, 3) of a mesh's nodes [m]"]
 MIRRORED = 1e-6  # of the largest value: others so near are mirror images of it, and which is larger is chance
 
 

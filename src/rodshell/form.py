@@ -44,7 +44,7 @@ from rodshell.results.from_checks import (
     sharpest,
 )
 from rodshell.results.from_form import results_of, states_of, with_refinement, with_seam_forces
-from rodshell.results.strength_used import THIN
+from rodshell.results.judged.stress import THIN
 from rodshell.rods.section import Rod
 from rodshell.targets import Seam, Target
 from rodshell.validation import instance

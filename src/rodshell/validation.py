@@ -92,18 +92,14 @@ def number(name: str, value: object, unit: str = "") -> float:
 def positive(name: str, value: object, unit: str = "", *, infinite: bool = False) -> float:
     """Return `value`, a number above 0, as a float; infinity only where it is allowed; see `number`."""
     real = _real(name, value, unit)
-    if real == inf and infinite:
-        return real
-    wanted = out_of_range(real, unit, size=True) if 0 < real < inf else "positive"
+    wanted = out_of_range(real, unit, size=True) if 0 < real < inf else "" if real == inf and infinite else "positive"
     return _allowed(name, value, unit, real, wanted)
 
 
 def not_negative(name: str, value: object, unit: str = "", *, infinite: bool = False) -> float:
     """Return `value`, a number of 0 or more, as a float; infinity only where it is allowed; see `number`."""
     real = _real(name, value, unit)
-    if real == inf and infinite:
-        return real
-    wanted = out_of_range(real, unit) if 0 <= real < inf else "0 or more"
+    wanted = out_of_range(real, unit) if 0 <= real < inf else "" if real == inf and infinite else "0 or more"
     return _allowed(name, value, unit, real, wanted)
 
 

@@ -26,7 +26,6 @@ LONG = 500  # lines of a file
 LONG_FILES = {
     "formfinding/popup.py": "every solve of a pop-up: from the draped and the flat state, of one grid and of several",
     "model/shell.py": "the shell, put together once of its rods, joints and supports",
-    "results/verdict.py": "every finding of a result in the order in which it counts",
     "solve/sparse_ldl.py": "numeric factorisation and solves: kernels that share the layout of the factors",
     "solve/symbolic.py": "the symbolic phase of the same factorisation",
 }

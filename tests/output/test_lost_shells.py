@@ -8,7 +8,7 @@ import pytest
 from rodshell.output.drawings import drawing_set, sheet_set
 from rodshell.output.files import save
 from rodshell.results import Archive, Results
-from rodshell.results.verdict import facts
+from rodshell.results.facts import facts
 from tests.output.sample_archive import sample_archive, table_archive
 
 

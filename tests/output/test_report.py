@@ -20,8 +20,8 @@ from rodshell.output.report import checks_table, key_figures
 from rodshell.output.viewer import Scene, scene_of
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
+from rodshell.results.facts import facts
 from rodshell.results.from_form import rod_type
-from rodshell.results.verdict import facts
 from rodshell.results.wording import Rounding
 from tests.acceptance.cases import ROD
 from tests.output.browser import SCALE, coloured, needs_browser, open_report, wrong_legends

@@ -16,10 +16,11 @@ from rodshell.figures.checks import EndsInTheAir
 from rodshell.figures.findings import CODES, FAULTS, GOOD, RANKS, said
 from rodshell.figures.sentences import SENTENCES
 from rodshell.results import Results, Verdict
+from rodshell.results.facts import facts
+from rodshell.results.judged.supports import in_the_air
 from rodshell.results.summary import summary_text
-from rodshell.results.supports import in_the_air
-from rodshell.results.verdict import facts, verdict_of
 from rodshell.results.verdict import verdict as judged
+from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import rounded_down
 
 

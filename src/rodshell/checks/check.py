@@ -250,7 +250,8 @@ def _long_checks(
     popped: Mapping[Ends, PopUp], done: Mapping[Ends, PopUp], stages: int, plan: Floats | None, progress: Progress
 ) -> dict[str, Any]:
     """Fields of `Checks`, of the settled shells that are `done`, as far as the time limit allows."""
-    upright = _deployable(done) if stages > 0 else None
+    held = (ends for ends, shape in done.items() if not (shape.support.holds_directions or shape.shell.yields))
+    upright = next(held, None) if stages > 0 else None  # held in place and free to turn: can be followed from flat
     clamped = next((ends for ends, shape in done.items() if len(shape.shell.ghosts) and not shape.shell.yields), None)
     deployment, turned, stopped = None, None, ""
     weights, snow, others = dict[Ends, SelfWeight](), dict[Ends, float | None](), dict[Ends, OtherShapes]()
@@ -294,12 +295,6 @@ def _long_checks(
         "stopped": stopped,
         "missing": tuple(missing),
     }
-
-
-def _deployable(shapes: Mapping[Ends, PopUp]) -> Ends | None:
-    """The first shell whose ends are held in place and free to turn, which can be followed from flat."""
-    held = (ends for ends, shape in shapes.items() if not (shape.support.holds_directions or shape.shell.yields))
-    return next(held, None)
 
 
 def _other_shapes(

@@ -59,7 +59,7 @@ class OtherShape(figures.OtherShape):
 
 
 @dataclass(frozen=True)
-class Gap:
+class LostPart:
     """Where a deployment was lost, seen from flat and from the final shape.
 
     Args:
@@ -92,7 +92,7 @@ class Deployment(figures.Deployment):
         description="at each stage but the flat grid, with its state (N, 3), whose twist angles belong to that shell's "
         "source frames",
     )
-    gap: Found[Gap | None] = key("where it was lost")
+    gap: Found[LostPart | None] = key("where it was lost")
     elsewhere: OtherShape | None = key("the shape in which it ends instead")
 
     @property
@@ -140,7 +140,7 @@ def deploy(
             other = path.forwards(upper, low, every[::-1])
             lower = other if other.arrived or lower.arrived is None else lower
     if lower.arrived is None:
-        gap = Gap(lower.reached, *path.end(upper[-1], every[-1]))
+        gap = LostPart(lower.reached, *path.end(upper[-1], every[-1]))
         lower, lost = _Forwards([], (), None), down_to
     elif lower.arrived and lower.stages:
         down_to = lower.stages[-1][0]  # where it meets the path backwards
@@ -195,14 +195,14 @@ def deploy_grids(popped: PopUp, *, stages: int, progress: Progress = lambda shar
         snapped_by=tuple(moved for _, moved in snaps),
         lost_at=max(lost, default=None),
         gap=max((way.gap for way in ways if way.gap is not None), key=lambda gap: gap.left, default=None),
-        reached_from_flat=all_true([way.reached_from_flat for way in ways]),
+        reached_from_flat=_all_true([way.reached_from_flat for way in ways]),
         elsewhere=max(elsewhere, key=lambda shape: shape.distance or 0.0, default=None),
         guided=max((way.guided for way in ways if way.guided is not None), default=None),
         factorizations=sum(way.factorizations or 0 for way in ways),
     )
 
 
-def all_true(answers: Sequence[bool | None]) -> bool | None:
+def _all_true(answers: Sequence[bool | None]) -> bool | None:
     """Whether all are true; None where that is not known."""
     return False if False in answers else None if None in answers else True
 
@@ -364,7 +364,7 @@ def reached_by_turning(pinned: PopUp, clamped: PopUp) -> bool | None:
         None where that could not be followed. The path continues after a snap. Of grids side by side whether all do.
     """
     if pinned.alone:
-        return all_true([reached_by_turning(*grid) for grid in zip(pinned.alone, clamped.alone, strict=True)])
+        return _all_true([reached_by_turning(*grid) for grid in zip(pinned.alone, clamped.alone, strict=True)])
     shell, mesh = clamped.shell, clamped.footprint.mesh
     now, outward = end_directions(mesh, pinned.positions), clamped.boundary.tangents
     start = clamped.state.copy()

@@ -312,12 +312,7 @@ def bends_of(
 def net_bends(net: ChebyshevNet) -> Bends:
     """Curvatures of both families at the nodes inside the target, by second differences."""
     normal, geodesic = list[Floats](), list[Floats]()
-    points, inside = net.net.points, net.net.inside
-    for x, s, mask in ((points, net.net.u, inside), (points.transpose(1, 0, 2), net.net.v, inside.T)):
-        slope = np.diff(x, axis=0) / np.diff(s)[:, None, None]
-        bend = np.diff(slope, axis=0) / (0.5 * (s[2:] - s[:-2]))[:, None, None]
-        known = mask[1:-1] & np.isfinite(bend[:, :, 0])
-        at, bend = x[1:-1][known], bend[known]
+    for at, bend in net.net.bends(net.net.inside):
         along = np.einsum("ij,ij->i", bend, net.target.on_surface(at).normal)
         normal.append(np.abs(along))
         geodesic.append(np.sqrt(np.maximum(np.einsum("ij,ij->i", bend, bend) - along**2, 0.0)))

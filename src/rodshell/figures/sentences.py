@@ -213,3 +213,12 @@ ANOTHER_WAY = (
     "; this is on one way, all ends moved evenly: erect it in another way that is checked, such as rod by rod over a "
     "scaffold, lifted at its middle, or one family's ends first"
 )
+
+USES = {
+    "bending": "the rods use {} of their design strength{}",
+    "shear": "the rods use {} of their design strength in shear{}",
+    "slip": "a joint has to transfer {} of the force at which it slips",
+    "permanent": "the erected shell, before loads act, uses {} of the rods' permanent design strength{}",
+    "slip_unloaded": "before loads act a joint of the erected shell has to transfer {} of the force at which it slips",
+}
+"""What is used too much, in the sentences on loads, and by which code."""

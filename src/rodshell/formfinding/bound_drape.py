@@ -14,7 +14,7 @@ from math import degrees
 
 import numpy as np
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, NodePositions
 from rodshell.contact.static import BoundToTarget
 from rodshell.formfinding.finite_sections import strong_bending, thickness_warnings
 from rodshell.formfinding.methods import Bound, Draped, DrapeFigures
@@ -24,7 +24,7 @@ from rodshell.kernels import njit
 from rodshell.layout import GridLayout, GridMesh, mesh_grid
 from rodshell.layout.flatgrid import sides
 from rodshell.layout.mesh import spans_along
-from rodshell.nets import ChebyshevNet, chebyshev_net
+from rodshell.nets import chebyshev_net
 from rodshell.nets.apron import with_apron
 from rodshell.progress import Progress, silent
 from rodshell.rods.elements import Stretch
@@ -237,13 +237,14 @@ def _tightest_bend(target: Target, layout: GridLayout, points: Floats) -> list[s
     ]
 
 
-def _net_deviation(target: Target, mesh: GridMesh, ends: Floats, whole: Ints, spans: Ints, positions: Floats) -> Floats:
+def _net_deviation(
+    target: Target, mesh: GridMesh, ends: Floats, whole: Ints, spans: Ints, positions: NodePositions
+) -> Floats:
     """(k, 2) how far past both ends of each rod that is built this state crosses the target's end, along the rod [m].
 
     Args:
         ends, whole: (k, 2), (k,) of rods as cut by the net [m], and the rod of the mesh that each belongs to.
         spans: (k, 2) see `spans_along`.
-        positions: (n, 3) of the mesh's nodes [m].
     """
     nodes, ends, whole = spans.ravel(), ends.ravel(), np.repeat(whole, 2)
     first, last = mesh.rod_start[whole], mesh.rod_stop[whole] - 1
@@ -257,12 +258,3 @@ def _net_deviation(target: Target, mesh: GridMesh, ends: Floats, whole: Ints, sp
     bend[bent] = ((f[2] - f[1])[bent] / (x[2] - x[1])[bent] - slope[bent]) / (x[2] - x[0])[bent]
     ahead = (f[0] - x[0] * slope + x[0] * x[1] * bend) / ((x[0] + x[1]) * bend - slope)
     return np.asarray(ahead.reshape(-1, 2) * [-1.0, 1.0])
-
-
-def shape_of_net(net: ChebyshevNet) -> dict[str, object]:
-    """Key figures of a net for the result file: its error [m], and its smallest angle and where that is [m]."""
-    return {
-        "error_estimate": net.error_estimate,
-        "min_angle_deg": degrees(net.min_angle),
-        "min_angle_at": list(net.min_angle_at),
-    }

@@ -22,7 +22,7 @@ from rodshell.nets.net_refinement import interpolated
 from rodshell.targets import Target
 
 Point = tuple[float, float]
-OnSeam = Callable[[Floats], Bools]  # whether points (k, 3) of the end lie on a seam whose rods are given
+_OnSeam = Callable[[Floats], Bools]  # whether points (k, 3) of the end lie on a seam whose rods are given
 
 ROUNDS = 4  # of corrections; three are enough
 SETTLED = 1e-7  # of the size: largest move of a rod in the last round
@@ -51,7 +51,7 @@ class EndGoals:
     points: Floats
     tangents: Floats
     rows: Sequence[Ints]
-    on_seam: OnSeam
+    on_seam: _OnSeam
 
 
 @dataclass(frozen=True)
@@ -69,20 +69,6 @@ class MatchedEnd:
     distance: float
 
 
-@dataclass(frozen=True, eq=False)
-class MatchedNet:
-    """A layout and its net, with the rod ends that lie at the points where rods should end.
-
-    Args:
-        anchor: x, y of the point under the layout's middle [m].
-    """
-
-    layout: GridLayout
-    anchor: Point
-    net: ChebyshevNet
-    matched: tuple[MatchedEnd, ...]
-
-
 @dataclass
 class _Line:
     """A line of family u (0) or v (1), at an offset [m], that is to end at some of the points."""
@@ -94,12 +80,15 @@ class _Line:
 
 def match_net(
     target: Target, layout: GridLayout, anchor: Point, goals: EndGoals, *, eccentricity: float = 0.0
-) -> MatchedNet:
+) -> tuple[GridLayout, Point, ChebyshevNet, tuple[MatchedEnd, ...]]:
     """Choose the lines of a layout such that its rods end at the goals, one at each; goals may remain without a rod.
 
     Args:
         anchor: x, y of the point of the target under the layout's middle [m].
         eccentricity: distance of the layers of families u and v [m].
+
+    Returns:
+        The layout, its anchor and its net, and the rod ends that lie at goals.
 
     Raises:
         NetLimitError: no net covers the target from this anchor and heading.
@@ -124,7 +113,7 @@ def match_net(
         if moved < SETTLED * target.size:
             break
     close = tuple(end for end in matched if end.distance < THERE * min(layout.spacing))
-    return MatchedNet(laid, anchor, net, close)
+    return laid, anchor, net, close
 
 
 def _coordinates(net: ChebyshevNet, points: Floats) -> Floats:

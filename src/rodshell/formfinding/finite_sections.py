@@ -14,7 +14,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, NodePositions
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.layout import GridMesh
 from rodshell.model import Shell
@@ -39,33 +39,21 @@ def joint_tangents(mesh: GridMesh, positions: Floats) -> Floats:
     return np.asarray(after - before)
 
 
-def joint_angles(mesh: GridMesh, positions: Floats) -> Floats:
-    """(c,) angles between both rods at each joint, 0 to pi/2 [rad].
-
-    Args:
-        positions: (n, 3) of the mesh's nodes [m].
-    """
+def joint_angles(mesh: GridMesh, positions: NodePositions) -> Floats:
+    """(c,) angles between both rods at each joint, 0 to pi/2 [rad]."""
     first, second = joint_tangents(mesh, positions).transpose(1, 0, 2)
     return np.asarray(np.arctan2(np.linalg.norm(cross(first, second), axis=1), np.abs(dot(first, second))))
 
 
-def joint_normals(mesh: GridMesh, positions: Floats) -> Floats:
-    """(c, 3) unit normals at the joints, across both rods, on the side that is up in the flat grid.
-
-    Args:
-        positions: (n, 3) of the mesh's nodes [m].
-    """
+def joint_normals(mesh: GridMesh, positions: NodePositions) -> Floats:
+    """(c, 3) unit normals at the joints, across both rods, on the side that is up in the flat grid."""
     tangents, flat = joint_tangents(mesh, positions), joint_tangents(mesh, mesh.flat)
     up = np.sign(cross(flat[:, 0], flat[:, 1])[:, 2:])
     return unit(up * cross(tangents[:, 0], tangents[:, 1]))
 
 
-def node_normals(mesh: GridMesh, positions: Floats) -> Floats:
-    """(n, 3) unit normals at all nodes, those of the joints interpolated linearly along the rods.
-
-    Args:
-        positions: (n, 3) of the mesh's nodes [m].
-    """
+def node_normals(mesh: GridMesh, positions: NodePositions) -> Floats:
+    """(n, 3) unit normals at all nodes, those of the joints interpolated linearly along the rods."""
     (crossings, share), at_joints = mesh.between_crossings, joint_normals(mesh, positions)
     first, last = at_joints[crossings].transpose(1, 0, 2)
     total = np.zeros((mesh.node_count, 3))
@@ -104,7 +92,7 @@ def middle_surface(mesh: GridMesh, layered: GridMesh, positions: Floats) -> Floa
     return total / np.bincount(mesh.rod_nodes, minlength=mesh.node_count)[:, None]
 
 
-def rod_thickness(rod: Rod) -> float:
+def _rod_thickness(rod: Rod) -> float:
     """Size of a rod's section along the shell's normal [m]; 0 where the shape of its section is not known."""
     return 0.0 if isinstance(rod.section, GivenSection) else 2 * rod.section.half_widths[0]
 
@@ -125,7 +113,7 @@ def thickness_warnings(
         touching: (n,) which of them lie on the target itself, not on its continuation.
         spacing: of the rods [m].
     """
-    thick, (a, b) = rod_thickness(rod), mesh.edges.T
+    thick, (a, b) = _rod_thickness(rod), mesh.edges.T
     turn, chord = normal[b] - normal[a], positions[b] - positions[a]
     bent = thick * (touching[a] & touching[b]) * dot(turn, chord) / dot(chord, chord)
     if not (np.abs(bent).max(initial=0.0) > THICK or thick > CLOSE * spacing):

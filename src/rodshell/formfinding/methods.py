@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
 import numpy as np
 
-from rodshell.arrays import Bools, Floats
+from rodshell.arrays import Bools, Floats, NodePositions
 from rodshell.contact.modified_mass import Stopped
 from rodshell.errors import InputError
 from rodshell.formfinding.finite_sections import StrongBending, joint_angles
@@ -228,11 +228,12 @@ class Draped:
         return self.report.status is Status.CONVERGED
 
 
-def smallest_joint_angle(mesh: GridMesh, positions: Floats, inside: Bools) -> tuple[float, tuple[float, float, float]]:
+def smallest_joint_angle(
+    mesh: GridMesh, positions: NodePositions, inside: Bools
+) -> tuple[float, tuple[float, float, float]]:
     """Smallest angle between two rods at a joint [rad], and where it is [m].
 
     Args:
-        positions: (n, 3) of the mesh's nodes [m].
         inside: (n,) nodes whose joints are considered.
     """
     angle = np.where(inside[mesh.joint_nodes], joint_angles(mesh, positions), np.inf)

@@ -91,14 +91,14 @@ def agreement(popped: PopUp, target: Target) -> Agreement:
     instance("popped", popped, PopUp, "what rodshell.pop_up returned")
     instance("target", target, Target)
     nodes, mesh = popped.positions, popped.footprint.mesh
-    points = np.concatenate([nodes, edge_middles(mesh, nodes)])
+    points = np.concatenate([nodes, _edge_middles(mesh, nodes)])
     gaps = target.distance(points) - np.concatenate([mesh.heights, mesh.heights[mesh.edges[:, 0]]])
     k = largest_at(np.abs(gaps))
     x, y, z = points[k].tolist()
     return Agreement(gaps[: len(nodes)], abs(float(gaps[k])), sqrt((gaps * gaps).mean()), (x, y, z), target.size)
 
 
-def edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
+def _edge_middles(mesh: GridMesh, positions: Floats) -> Floats:
     """(e, 3) points of the rods halfway along each edge, on the cubic through the nearest nodes of the rod."""
     middles = list[Floats]()
     for k in range(len(mesh.rod_start)):

@@ -32,7 +32,7 @@ from rodshell.rods.supports import CLAMPED, PINNED, Support, support_of
 from rodshell.solve.equilibrium import Equilibrium, SolveReport, Status, find_stable
 from rodshell.solve.grids import alone, together
 from rodshell.solve.path import MOST_STEPS, follow, relax, trace
-from rodshell.solve.problem import Pattern, Problem, Supports, mean_radius
+from rodshell.solve.problem import MatrixPattern, Problem, Supports, mean_radius
 from rodshell.units import length_text
 from rodshell.validation import Ends, choice, instance, whole
 
@@ -193,7 +193,7 @@ class _Stages:
     rod: Rod
     joint: Joint | Sequence[Joint]
     progress: Progress
-    pattern: Pattern | None = None
+    pattern: MatrixPattern | None = None
     most_factorizations: int | None = None
     isotropic: bool | None = None
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, Forces, State
 from rodshell.contact.modified_mass import Touching
 from rodshell.geometry.frames import dot
 from rodshell.model import Freedom, Shell
@@ -52,22 +52,15 @@ class Rest:
         return float(np.sqrt(max(0.0, -min(self.growth, default=0.0))))
 
 
-def out_of_balance(motion: Motion, state: Floats, load: Floats) -> Floats:
-    """(N, 3) gradient of all energies less the load [N]: what supports and contact must carry.
-
-    Args:
-        state: (N, 3) nodes [m] and twist angles [rad].
-        load: (N, 3) on them [N], [N m].
-    """
+def out_of_balance(motion: Motion, state: State, load: Forces) -> Floats:
+    """(N, 3) gradient of all energies less the load [N]: what supports and contact must carry."""
     return motion.energies.gradient(state) - load
 
 
-def unbalanced_force(motion: Motion, state: Floats, load: Floats, touching: Touching) -> float:
+def unbalanced_force(motion: Motion, state: State, load: Forces, touching: Touching) -> float:
     """Largest force on a node that neither its supports nor contact nor friction balance [N].
 
     Args:
-        state: (N, 3) nodes [m] and twist angles [rad].
-        load: (N, 3) on them [N], [N m].
         touching: the nodes in contact with the target.
     """
     gradient = out_of_balance(motion, state, load)
@@ -77,12 +70,10 @@ def unbalanced_force(motion: Motion, state: Floats, load: Floats, touching: Touc
     return float(np.sqrt(dot(along, along).max(initial=0.0)))
 
 
-def lowest_modes(motion: Motion, state: Floats, load: Floats, touching: Touching, target: Target) -> tuple[float, ...]:
+def lowest_modes(motion: Motion, state: State, load: Forces, touching: Touching, target: Target) -> tuple[float, ...]:
     """The lowest s of K x = s M x [1/s2] with the touching nodes sliding on the target, without friction.
 
     Args:
-        state: (N, 3) nodes [m] and twist angles [rad].
-        load: (N, 3) on them [N], [N m].
         touching: the nodes in contact with the target.
     """
     sliding = replace(touching, stuck=np.zeros(len(touching.nodes), dtype=bool))

@@ -277,9 +277,9 @@ def lay_patches(
         try:
             if to_meet:
                 wanted = _end_goals(patch, to_meet, [net.patch for net in patch_nets.values()])
-                found = match_net(patch, layout, anchor, wanted, eccentricity=eccentricity)
-                patch_nets[name] = PatchNet(patch, found.layout, found.anchor, found.net)
-                for met in found.matched:
+                layout, anchor, net, matched = match_net(patch, layout, anchor, wanted, eccentricity=eccentricity)
+                patch_nets[name] = PatchNet(patch, layout, anchor, net)
+                for met in matched:
                     other = to_meet[met.point]
                     meetings.append(Meeting(other.seam, other.point, (other.end, End(name, met.rod, met.side))))
             else:

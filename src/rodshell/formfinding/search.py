@@ -140,17 +140,8 @@ def _best_so_far(objective: Objective, trials: list[Trial]) -> str:
 
 def largest_curvature(net: ChebyshevNet) -> float:
     """Largest curvature of all rods on the target, by second differences [1/m]."""
-    inside = inside_nodes(net.target, net.net)
-    found = 0.0
-    for x, s, mask in (
-        (net.net.points, net.net.u, inside),
-        (net.net.points.transpose(1, 0, 2), net.net.v, inside.T),
-    ):
-        before, after = np.diff(s)[:-1], np.diff(s)[1:]
-        slope = np.diff(x, axis=0) / np.diff(s)[:, None, None]
-        bend = np.linalg.norm(np.diff(slope, axis=0), axis=2) / (0.5 * (before + after))[:, None]
-        found = max(found, float(bend[mask[1:-1]].max(initial=0.0)))
-    return found
+    bends = net.net.bends(inside_nodes(net.target, net.net))
+    return max(float(np.linalg.norm(bend, axis=1).max(initial=0.0)) for _, bend in bends)
 
 
 def _gap(target: Target, layout: GridLayout, rod: Rod, anchor: Point) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from rodshell.arrays import Floats
+from rodshell.arrays import Floats, NodePositions
 from rodshell.errors import InputError, RodshellError
 from rodshell.formfinding.finite_sections import node_normals, place_in_layers
 from rodshell.formfinding.methods import Bound, Draped
@@ -196,12 +196,8 @@ def ends_past_net(trimmed: Trimmed) -> Floats | None:
     return np.array([[exact[rod.name].start - rod.start, rod.end - exact[rod.name].end] for rod in rods])
 
 
-def end_tangents(mesh: GridMesh, positions: Floats) -> Floats:
-    """(2m, 3) outward unit tangents at start and end of each rod in turn, to second order from the last two edges.
-
-    Args:
-        positions: (n, 3) of the mesh's nodes [m].
-    """
+def end_tangents(mesh: GridMesh, positions: NodePositions) -> Floats:
+    """(2m, 3) outward unit tangents at start and end of each rod in turn, to second order from the last two edges."""
     first, last = mesh.rod_start, mesh.rod_stop - 1
     end, inwards = np.column_stack([first, last]).ravel(), np.tile([1, -1], len(first))
     next_to, long = end + inwards, np.repeat(last - first > 1, 2)

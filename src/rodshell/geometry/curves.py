@@ -90,7 +90,7 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
     shares = np.empty((spare + 1, 4))
     for n in range(len(s)):
         right[n] = _right_of(knots, s[n])
-        windows[n] = nearest_four(knots, s[n], right[n], 0, count - 1, shares, n)
+        windows[n] = _nearest_four(knots, s[n], right[n], 0, count - 1, shares, n)
     for m in range(lines):
         first, last = origin, origin
         while first > 0 and not np.isnan(points[first - 1, m, 0]):
@@ -111,7 +111,7 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
                 continue
             row, window, x, y, z = n, windows[n], 0.0, 0.0, 0.0
             if window < first or window + most - 1 > last:
-                row, window = spare, nearest_four(knots, s[n], right[n], first, last, shares, spare)
+                row, window = spare, _nearest_four(knots, s[n], right[n], first, last, shares, spare)
             for k in range(near):
                 x += shares[row, k] * points[window + k, m, 0]
                 y += shares[row, k] * points[window + k, m, 1]
@@ -121,7 +121,7 @@ def resampled(knots: Floats, points: Floats, origin: int, s: Floats, beyond: flo
 
 
 @njit(error_model="numpy")
-def nearest_four(knots, at, right, first, last, shares, row):  # type: ignore[no-untyped-def]
+def _nearest_four(knots, at, right, first, last, shares, row):  # type: ignore[no-untyped-def]
     """Of the knots from the `first` to the `last`: the first of the four nearest to `at`, with `right` knots before it,
     and their weights in a cubic, put into `shares[row]` (4,)."""
     near = min(4, last - first + 1)

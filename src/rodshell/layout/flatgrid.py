@@ -78,8 +78,7 @@ class FlatRod(NamedTuple):
         if across:
             (x, y), (nx, ny) = origin, self.across
             offset, origin = None if offset is None else offset + across, (x + across * nx, y + across * ny)
-        line = self.name, self.family, offset, start, end, origin, self.direction
-        return FlatRod(*line, self.virtual, self.profile, self.curve)
+        return self._replace(start=start, end=end, offset=offset, origin=origin)
 
 
 def whole_rods(rods: Sequence[FlatRod], pieces: Sequence[FlatRod]) -> Ints:

@@ -114,20 +114,11 @@ class GridLayout:
         left_out: tuple[str, ...] = (),
         crossing: float = pi / 2,
     ) -> "GridLayout":
-        """Make a layout of equally spaced rods along x and along y.
+        """Make a layout of equally spaced rods along x and along y; arguments and errors as of `GridLayout`.
 
         Args:
-            rods: number of rods along x and along y, or "auto" for every line that touches the target.
-            spacing: between neighbouring rods: one length, or one for each family [m].
-            length: of every rod before trimming [m], or "auto" for the length that is needed.
-            edge: longest edge of the mesh [m]; "auto" for a sixth of the smaller spacing, and half of it for a `Fall`.
-            rotate: angle of family u against the target's x axis [rad].
-            offset: shift (x, y) of the lattice against the axes through the anchor [m].
-            left_out: names of rods that are not built.
-            crossing: angle between the families on the target, where its axes cross [rad].
-
-        Raises:
-            InputError: as `GridLayout` does.
+            spacing: one length for both families, or one for each [m].
+            edge: "auto" for a sixth of the smaller spacing, and half of it for a `Fall`.
         """
         instance("layout spacing", spacing, tuple | list | Real | np.ndarray, "one or two lengths in m")
         pair = spacing if isinstance(spacing, tuple | list | np.ndarray) else (spacing, spacing)
@@ -220,9 +211,7 @@ def lattice_rod(family: int, name: str, offset: float, start: float, end: float,
 
     Args:
         family: 0 or 1, of `FAMILIES`.
-        name: label such as "U09".
-        start, end: material coordinates of the ends, x or y [m].
-        virtual: whether the line only shapes the net and is not built.
+        name, start, end, virtual: as of `FlatRod`.
     """
     line = ((0.0, offset), (1.0, 0.0)) if family == 0 else ((offset, 0.0), (0.0, 1.0))
     return FlatRod(name, FAMILIES[family], offset, start, end, *line, virtual)

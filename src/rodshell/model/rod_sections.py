@@ -51,7 +51,7 @@ class RodSections:
         nodes = of_rods[:3].T.take(rod_of, axis=0)
         of_edges = of_rods.take(mesh.edge_rods, axis=1)
         edges, (stretch, mass, rotary) = of_edges[:3].T, of_edges[3:]
-        for rod, profile, entries in varied_rods(mesh, rods):
+        for rod, profile, entries in _varied_rods(mesh, rods):
             inner = rod_of[entries[1:]] == rod_of[entries[:-1]]
             here = (entries - rod_of[entries])[:-1][inner]  # edges are counted rod by rod
             s = shares(mesh, entries)
@@ -89,7 +89,7 @@ def _inverse(rod: Rod, varies: str, factors: Floats) -> Floats:
     return np.column_stack([*compliances, by.stretch, by.rotary])
 
 
-def varied_rods(mesh: GridMesh, rods: Rod | Sequence[Rod]) -> Iterator[tuple[Rod, Profile, Ints]]:
+def _varied_rods(mesh: GridMesh, rods: Rod | Sequence[Rod]) -> Iterator[tuple[Rod, Profile, Ints]]:
     """The rods whose sections change, those that are alike together: rod, profile, and their entries of `rod_nodes`.
 
     Args:
@@ -115,7 +115,7 @@ def shares(mesh: GridMesh, entries: Ints) -> Floats:
 def varied_at_nodes(mesh: GridMesh, rod: Rod) -> Varied | None:
     """What the sections change at each entry (k,) of `rod_nodes`, from rods that are all the same where their factor is
     1; None where all rods are uniform."""
-    found = list(varied_rods(mesh, rod))
+    found = list(_varied_rods(mesh, rod))
     if not found:
         return None
     columns = {name: np.ones(len(mesh.rod_nodes)) for name in Varied.__dataclass_fields__}

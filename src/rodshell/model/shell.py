@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rodshell.arrays import Floats, Ints, State
+from rodshell.arrays import Floats, Ints, NodePositions, State
 from rodshell.errors import InputError
 from rodshell.geometry.frames import adapted, parallel_transport, signed_angle, unit
 from rodshell.joints import (
@@ -49,7 +49,7 @@ from rodshell.validation import flag, instance
 
 OFFSET_STIFFNESS = 10.0  # times that of an edge in stretch: ties of eccentric joints
 Direction = tuple[float, float, float]
-Item = TypeVar("Item")
+_Item = TypeVar("_Item")
 COUPLING = "a rodshell coupling such as rodshell.SharedDofs()"
 
 
@@ -206,11 +206,10 @@ class Shell:
             beam.add_mass(mass)
         return mass
 
-    def state(self, positions: Floats, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
+    def state(self, positions: NodePositions, tangents: Floats | None = None, normals: Floats | None = None) -> Floats:
         """(N, 3) state of the shell.
 
         Args:
-            positions: (n, 3) of the mesh's nodes [m].
             tangents: (2m, 3) outward unit tangents at the rod ends, which clamped ends need.
             normals: (n, 3) of the surface at the nodes. Each edge's first material director is turned towards them;
                 None: the directors are those of the flat grid, moved by the smallest rotation.
@@ -515,7 +514,7 @@ class _Builder:
         return min(float(value.C1 or 0.0) for value in values), min(float(value.C2 or 0.0) for value in values)
 
 
-def _per_item(value: Item | Sequence[Item], count: int, items: str) -> tuple[Item, ...]:
+def _per_item(value: _Item | Sequence[_Item], count: int, items: str) -> tuple[_Item, ...]:
     """A tuple of `count` values, from one for all or one for each."""
     if not isinstance(value, Sequence):
         return (value,) * count

@@ -9,6 +9,7 @@ P + h n(P), h being the height of the rod's layer and n the target's normal, and
 The net's points P are on the target, between the layers.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -52,6 +53,15 @@ class Net:
         """Indices of the anchor, (u, v) = (0, 0)."""
         return int(np.abs(self.u).argmin()), int(np.abs(self.v).argmin())
 
+    def bends(self, among: Bools) -> Iterator[tuple[Floats, Floats]]:
+        """Of each family the nodes (k, 3) [m] and its lines' curvatures there (k, 3) [1/m], by second differences, at
+        those among (nu, nv) whose neighbours are known."""
+        for x, s, marked in ((self.points, self.u, among), (self.points.transpose(1, 0, 2), self.v, among.T)):
+            slope = np.diff(x, axis=0) / np.diff(s)[:, None, None]
+            bend = np.diff(slope, axis=0) / (0.5 * (s[2:] - s[:-2]))[:, None, None]
+            known = marked[1:-1] & np.isfinite(bend[:, :, 0])
+            yield x[1:-1][known], bend[known]
+
 
 class Axes(NamedTuple):
     """Where the axes of a net cross.
@@ -91,7 +101,7 @@ def lay_axes(target: Target, net: Net, start: Axes, *, tolerance: float = TOLERA
     else:
         found = list[Floats]()
         for height, pair in zip(net.heights, (slice(0, 2), slice(2, 4)), strict=True):
-            layer = Layer(target, height)
+            layer = NetLayer(target, height)
             begin = np.repeat(layer.of(anchor[None]), 2, axis=0)
             on_layer = geodesics(layer, begin, tangents[pair], steps[pair], tolerance=tolerance)
             found += [layer.below(arm) for arm in on_layer]
@@ -113,7 +123,7 @@ def axes(target: Target, anchor: Floats, heading: Floats) -> Axes:
 
 
 @dataclass(frozen=True)
-class Layer:
+class NetLayer:
     """The surface parallel to a target, with what a march needs of it.
 
     Args:
@@ -145,7 +155,7 @@ class Layer:
 
 
 def geodesics(
-    target: Target | Layer, start: Floats, direction: Floats, steps: list[Floats], *, tolerance: float = TOLERANCE
+    target: Target | NetLayer, start: Floats, direction: Floats, steps: list[Floats], *, tolerance: float = TOLERANCE
 ) -> list[Floats]:
     """Discrete geodesics, several at once, by given chord lengths; second order.
 
@@ -251,7 +261,7 @@ def _compass(
     a, b, p = known
     layered, none = heights != ON_SURFACE, np.empty((0, 3, 3))
     if layered:  # A and B on the layers of the rods that lead from them to P
-        a, b = Layer(target, heights[1]).of(a), Layer(target, heights[0]).of(b)
+        a, b = NetLayer(target, heights[1]).of(a), NetLayer(target, heights[0]).of(b)
     change, sine = np.empty(len(p)), np.empty(len(p))
     for _ in range(NEWTON_STEPS):
         value, gradient, hessian = target.implicit(p) if layered else (*target.level(p), none)

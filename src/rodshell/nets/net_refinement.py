@@ -18,8 +18,8 @@ from rodshell.nets.compass import (
     SMALLEST_SINE,
     Axes,
     Heights,
-    Layer,
     Net,
+    NetLayer,
     arms,
     dot,
     fill_quadrants,
@@ -98,10 +98,10 @@ def _refine_axes(target: Target, net: Net, start: Axes, converged: float) -> boo
     points = net.points[rows, columns]
     if not np.isfinite(points).all():
         return False
-    layers = list[tuple[Layer, slice]]()
+    layers = list[tuple[NetLayer, slice]]()
     if net.heights != ON_SURFACE:  # each axis on its own
         parts = slice(0, stops[2]), slice(stops[2], stops[4])
-        layers = [(Layer(target, height), part) for height, part in zip(net.heights, parts, strict=True)]
+        layers = [(NetLayer(target, height), part) for height, part in zip(net.heights, parts, strict=True)]
         starts = np.concatenate([np.repeat(layer.of(start.anchor[None]), 2, axis=0) for layer, _ in layers])
         points = np.concatenate([layer.of(points[part]) for layer, part in layers])
     moved, limit = np.inf, converged * target.size

@@ -13,8 +13,8 @@ from rodshell.output.drawing import Pen, Pencil
 from rodshell.output.grid import Shape, shape_of
 from rodshell.output.svg import document, label, number, tag
 from rodshell.results.archive import Archive, made_once
+from rodshell.results.judged.stress import by_code
 from rodshell.results.states import is_shell, shells_among
-from rodshell.results.strength_used import by_code
 from rodshell.results.wording import MINUS, nice_step, nice_ticks
 from rodshell.units import PRESSURES
 

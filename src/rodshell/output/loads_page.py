@@ -15,7 +15,7 @@ from rodshell.figures.records import Ends
 from rodshell.output.pictures import mode_picture
 from rodshell.output.svg import inline, picture_document
 from rodshell.results import Archive, Results
-from rodshell.results.supports import share_of_span
+from rodshell.results.judged.supports import share_of_span
 from rodshell.results.wording import millimetres, percent, rounded, rounded_down, rounding_of, shown_factor, stress
 from rodshell.units import percent_text
 

@@ -27,10 +27,11 @@ from rodshell.output.svg import SCALE, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
+from rodshell.results.facts import facts
+from rodshell.results.judged.deployment import unknown_below
+from rodshell.results.judged.stress import by_design_strength
 from rodshell.results.laths import laths_text
 from rodshell.results.states import is_shell, shells_among
-from rodshell.results.strength_used import by_design_strength
-from rodshell.results.verdict import facts, unknown_below
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
 from rodshell.rods.supports import finals_first
 from rodshell.units import places_text

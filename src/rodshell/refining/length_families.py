@@ -59,7 +59,7 @@ class Tails:
     def on(self, structure: Structure) -> Stations:
         """The change of the tail at the start and the end of each rod."""
         mesh = structure.mesh
-        points, ends = moved_points(mesh), mesh.end_entries
+        points, ends = _moved_points(mesh), mesh.end_entries
         inner = points[np.searchsorted(points, ends) + np.tile([1, -1], len(mesh.rod_start))]
         tails = np.abs(mesh.stations[ends] - mesh.stations[inner])
         span, outward = usual_span(mesh), np.tile([-1.0, 1.0], len(mesh.rod_start))
@@ -129,14 +129,14 @@ def usual_span(mesh: GridMesh) -> float:
     return float(np.median(np.diff(mesh.stations[entries])[same]))
 
 
-def moved_points(mesh: GridMesh) -> Ints:
+def _moved_points(mesh: GridMesh) -> Ints:
     """Entries of `rod_nodes` that variables move, ascending: joints and ends of rods."""
     return np.unique(np.append(mesh.at_crossings, mesh.end_entries))
 
 
 def between(mesh: GridMesh) -> csr_array:
-    """(k, k) displacements of all rod nodes by those of `moved_points`, linear between these."""
-    every, s, points = np.arange(len(mesh.rod_nodes)), mesh.stations, moved_points(mesh)
+    """(k, k) displacements of all rod nodes by those of `_moved_points`, linear between these."""
+    every, s, points = np.arange(len(mesh.rod_nodes)), mesh.stations, _moved_points(mesh)
     after = np.searchsorted(points, every)
     low, high = points[np.where(points[after] == every, after, after - 1)], points[after]
     span = s[high] - s[low]

@@ -113,7 +113,7 @@ def refine(
         InputError: no such family; the shell has no target, no pop-up with these ends, or is not stable.
         ConvergenceError: it falls under the loads, or has no stable equilibrium with the design to start from.
     """
-    families = chosen_families(vary)
+    families = _chosen_families(vary)
     if stages.flat_state is not None and (lengths := [each.name for each in families if each.name in LENGTHS]):
         raise InputError(
             f"{' and '.join(lengths)} cannot vary where rods follow curves of the target, on which their joints lie: "
@@ -219,7 +219,7 @@ def built(variables: Design, point: Point) -> Grid:
     return variables.applied(grid, values)
 
 
-def chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:
+def _chosen_families(vary: str | Family | Sequence[str | Family]) -> tuple[Family, ...]:
     """The families that are meant.
 
     Raises:

@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from rodshell.errors import InputError, OutputError
 from rodshell.results.folder import ResultFolder, reading
+from rodshell.results.judged.shape import CONVERGED
 from rodshell.results.manifest import inside
 from rodshell.results.results import Results, Verdict, read_results
 from rodshell.results.states import DRAPED, POPPED, packed, read_states, shells_among
 from rodshell.results.summary import summary_text
-from rodshell.results.verdict import CONVERGED, verdict_of
+from rodshell.results.verdict import verdict_of
 from rodshell.rods.supports import PINNED, finals_first
 from rodshell.untrusted import limit, raised, read_text
 from rodshell.validation import file_path, instance, mapping

@@ -18,8 +18,8 @@ from rodshell.figures.records import Ends
 from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
 from rodshell.loads.strength import Limits
+from rodshell.results.judged.supports import in_the_air
 from rodshell.results.results import Drawings, Results
-from rodshell.results.supports import in_the_air
 from rodshell.results.verdict import verdict
 from rodshell.rods.supports import finals_first
 

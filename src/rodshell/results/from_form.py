@@ -19,7 +19,6 @@ from rodshell.figures import form as figures
 from rodshell.figures.findings import said
 from rodshell.figures.records import Ends, plain
 from rodshell.formfinding import Footprint, Stages, Trimmed
-from rodshell.formfinding.bound_drape import shape_of_net
 from rodshell.formfinding.finite_sections import is_flat
 from rodshell.formfinding.seams import Seams
 from rodshell.formfinding.trim import ends_past_net
@@ -28,6 +27,7 @@ from rodshell.kernels import description
 from rodshell.layout import Profile
 from rodshell.loads.edge_beams import used_beams
 from rodshell.loads.settings import Strength
+from rodshell.nets import ChebyshevNet
 from rodshell.results.results import Results
 from rodshell.rods.materials import PRESETS
 from rodshell.rods.section import Rod
@@ -63,7 +63,7 @@ def results_of(stages: Stages) -> Results:
     if nets := [part.draped.net for part in stages.parts if part.draped.net is not None]:
         tightest = min(nets, key=lambda net: net.min_angle)
         error = max(net.error_estimate for net in nets)
-        known["net"] = figures.Net.model_validate(shape_of_net(tightest)).changed(error_estimate=error)
+        known["net"] = _net(tightest).changed(error_estimate=error)
     if stages.seams is None:
         grid = stages.footprint.mesh.grid
         known["crossings_without_joint"] = len(grid.meetings()) - len(grid.crossings)
@@ -261,6 +261,11 @@ def _stiffness(profile: Profile, length: float, kind: Rod) -> figures.Stiffness:
     )
 
 
+def _net(net: ChebyshevNet) -> figures.Net:
+    angle, where = degrees(net.min_angle), net.min_angle_at
+    return figures.Net(error_estimate=net.error_estimate, min_angle_deg=angle, min_angle_at=where)
+
+
 def _pop_ups(stages: Stages) -> dict[Ends, figures.PopUp]:
     """Figures of the pop-up with each kind of ends."""
     return {
@@ -292,7 +297,7 @@ def _patch(stages: Stages, seams: Seams, k: int) -> figures.Patch:
         spacing=laid.layout.spacing,
         flat_shift=moved[:2].tolist(),
         ends_moved=seams.moved[name],
-        net=figures.Net.model_validate(shape_of_net(laid.net)),
+        net=_net(laid.net),
         agreement=_agreements(found),
         drape=_drape(found.trimmed),
         pop_up=_pop_ups(found),

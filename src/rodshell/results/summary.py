@@ -7,13 +7,15 @@ from rodshell.figures.checks import OTHER_SHAPES, Bending, SelfWeight
 from rodshell.figures.form import Bent, RodType
 from rodshell.figures.loads import DesignStrength
 from rodshell.figures.records import printable
+from rodshell.results.judged.deployment import unknown_below
+from rodshell.results.judged.loads import UNLOADED, is_braced
+from rodshell.results.judged.shape import CONVERGED
+from rodshell.results.judged.stress import strength_name
+from rodshell.results.judged.supports import share_of_span
 from rodshell.results.laths import laths_text, lengths_text
-from rodshell.results.own_weight import is_braced
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import thinner_than_sold
-from rodshell.results.strength_used import strength_name
-from rodshell.results.supports import share_of_span
-from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict_of
+from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import (
     NAMES,
     case_rows,

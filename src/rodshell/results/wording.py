@@ -119,6 +119,11 @@ def millimetres(metres: float | None, digits: int = 3, rounding: Rounding = EXAC
     return f"{value:.{min(max(digits - whole, 0), rounding.digits)}f} mm"
 
 
+def drawn_length(results: Results, metres: float | None) -> str:
+    """A length [m] as fine as on the drawings."""
+    return millimetres(metres, rounding=rounding_of(results))
+
+
 def nice_step(span: float, count: int) -> float:
     """A step of 1, 2 or 5 times a power of ten that divides `span` into `count` parts or a few less."""
     if span <= 0:
@@ -137,6 +142,11 @@ def nice_ticks(low: float, high: float, count: int) -> list[float]:
 def percent(share: float | None) -> str:
     """A share as `units.percent_text` shows it; None or not finite: not known."""
     return UNKNOWN if share is None or not isfinite(share) else percent_text(share)
+
+
+def too_much(share: float) -> str:
+    """A share above 1, never shown as 100 %."""
+    return f"{max(101, round(100 * share))} %"
 
 
 def share_of_weight(found: SelfWeight) -> str:
@@ -257,8 +267,3 @@ def _case_value(key: str, value: Any, units: Mapping[str, tuple[float, str]], ro
         number = round(number, rounding.digits) or number
     shown = rounded(number, 5).replace("-", MINUS)
     return f"{shown}{unit}" if unit == "\N{DEGREE SIGN}" else f"{shown} {unit}".strip()
-
-
-def too_much(share: float) -> str:
-    """A share above 1, never shown as 100 %."""
-    return f"{max(101, round(100 * share))} %"

@@ -176,7 +176,7 @@ class BendTwist:
 
         The energy is quadratic in the strains, so that natural strains less by their change add just these moments.
         """
-        strains = strain_rates(self, state, motion)
+        strains = _strain_rates(self, state, motion)
         less = replace(
             self,
             natural_curvature=self.natural_curvature - strains[:, :2],
@@ -204,7 +204,7 @@ def frames_among(sets: Sequence[Elements]) -> BendTwist | None:
     return next((elements for elements in sets if isinstance(elements, BendTwist)), None)
 
 
-def strain_rates(elements: BendTwist, state: State, motion: Floats) -> Floats:
+def _strain_rates(elements: BendTwist, state: State, motion: Floats) -> Floats:
     """(b, 3) derivative of the strains along a motion, by central differences.
 
     Args:

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, diags, eye, triu
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from rodshell.arrays import Floats, Ints
+from rodshell.arrays import Floats, Ints, State
 from rodshell.errors import InputError, StabilityError
 from rodshell.model import Assembly, Freedom, Potential
 from rodshell.rods.elements import NO_HESSIANS, WithoutFrames
@@ -92,12 +92,11 @@ class ExplicitTies:
         return float(low)
 
 
-def step_limit(motion: Motion, state: Floats, time: float = 0.0, *, stopped: Ints = NO_NODES) -> float:
+def step_limit(motion: Motion, state: State, time: float = 0.0, *, stopped: Ints = NO_NODES) -> float:
     """Longest stable time step [s] at a state; infinite where nothing is explicit.
 
     Args:
         motion: its source frames being at the state.
-        state: (N, 3) [m, at twist angles rad].
         time: at which the constraint is taken [s].
         stopped: (k,) blocks that lose all their velocity at each step.
 

@@ -26,7 +26,7 @@ from rodshell.arrays import Floats
 from rodshell.errors import ConvergenceError, InputError, StabilityError
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load, LoadedAssembly
-from rodshell.solve.problem import Pattern
+from rodshell.solve.problem import MatrixPattern
 from rodshell.solve.sparse_ldl import SingularError
 from rodshell.solve.tangent import Tangent, TangentAssembly, generic, orthonormal, subspace_iteration
 
@@ -151,7 +151,7 @@ def softest_motion(equilibrium: Equilibrium) -> tuple[float, Floats]:
     return 1.0 / float(values[0]), freedom.expand(orthonormal(rows)[0])
 
 
-def _diagonal(pattern: Pattern, values: Floats) -> Floats:
+def _diagonal(pattern: MatrixPattern, values: Floats) -> Floats:
     return np.asarray(values[pattern.assembly.diagonal])
 
 

@@ -55,7 +55,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Iterate:
+class _Iterate:
     """Where an iteration is, and what its steps so far say of the next one.
 
     Args:
@@ -96,7 +96,7 @@ class Iterate:
     def finite(self) -> bool:
         return bool(np.isfinite(self.length) and np.isfinite(self.forces).all())
 
-    def refreshed(self) -> "Iterate":
+    def refreshed(self) -> "_Iterate":
         """The same with the source frames of the elements at the state."""
         return replace(self, problem=self.problem.refreshed(self.state))
 
@@ -131,12 +131,12 @@ class NewtonStep:
         self._no_forces = np.zeros(len(problem.stretch.blocks))
         self._factored, self._free = (state, self._no_forces), free  # where the matrix is from
 
-    def start(self, state: Floats, forces: Floats) -> Iterate:
+    def start(self, state: Floats, forces: Floats) -> _Iterate:
         """Where the iteration begins: in a state (n, 3) with axial forces (e,) [N]."""
         strains = self._problem.stretch.strains(state)
-        return Iterate(state=state, forces=forces, problem=self._problem, strains=strains)
+        return _Iterate(state=state, forces=forces, problem=self._problem, strains=strains)
 
-    def take(self, here: Iterate) -> Iterate:
+    def take(self, here: _Iterate) -> _Iterate:
         """The next iterate.
 
         Raises:
@@ -197,7 +197,7 @@ class NewtonStep:
         state = self._factored[0]
         return self._free.reduce(generic_motion(state, twist_angles(self._problem.elements, len(state))))[None]
 
-    def _direction(self, here: Iterate, right: Floats) -> tuple[Floats | None, Iterate]:
+    def _direction(self, here: _Iterate, right: Floats) -> tuple[Floats | None, _Iterate]:
         """Newton's step; where the Hessian is indefinite and equilibrium is far, that of the shifted Hessian, but None
         where the step that led there was too long. And the iterate with what is known then."""
         matrix = self.matrix
@@ -224,7 +224,7 @@ class NewtonStep:
         state = self._problem.constraint.retract(step.state + step.share * step.motion)
         return state, step.forces + step.share * step.change
 
-    def _shortened(self, here: Iterate) -> Iterate:
+    def _shortened(self, here: _Iterate) -> _Iterate:
         """After a part of the last step in its place: no iteration of its own."""
         assert here.step is not None
         step = replace(here.step, share=PART * here.step.share)
@@ -234,7 +234,7 @@ class NewtonStep:
             mismatch=np.inf, step=step, length=length, longest=length,
         )  # fmt: skip
 
-    def _judged(self, here: Iterate, step: Step) -> Iterate:
+    def _judged(self, here: _Iterate, step: Step) -> _Iterate:
         """After a step: whether the error that is left is small enough, and whether the factors serve for another one.
 
         After Newton's step the error is about its square; after a chord step it shrinks as from the last step to this.

@@ -79,7 +79,7 @@ class Supports:
 
 
 @dataclass(frozen=True, eq=False)
-class Pattern:
+class MatrixPattern:
     """What follows from the pattern of a problem's matrices alone. It never changes, so that any number of solves and
     tangents share it.
 
@@ -123,7 +123,7 @@ class Problem:
     inextensible: bool = False
     load: Floats | None = None
     flat_coordinates: Floats | None = None
-    pattern: Pattern | None = None
+    pattern: MatrixPattern | None = None
 
     @classmethod
     def of_shell(
@@ -133,7 +133,7 @@ class Problem:
         *,
         goals: Floats | None = None,
         elements: tuple[Elements, ...] | None = None,
-        pattern: Pattern | None = None,
+        pattern: MatrixPattern | None = None,
     ) -> Self:
         """A shell without loads whose rod ends are held, or are on their way.
 
@@ -165,7 +165,7 @@ class Problem:
         that nodes do not: two fifths of all pop-ups take more factorisations, up to three times as many.)"""
         return np.where(twist_angles(self.elements, count), 2.0 * np.pi, self.length)[:, None]
 
-    def pattern_at(self, state: Floats) -> Pattern:
+    def pattern_at(self, state: Floats) -> MatrixPattern:
         """The pattern of this problem, at any state: the one that comes with it where it serves, or a new one."""
         blocks, free = self.blocks(len(state)), self.constraint.freedom(state)
         if self.pattern is not None and self.pattern.serves(blocks, free.count):
@@ -175,7 +175,7 @@ class Problem:
             solver = self.pattern.solver
         else:
             solver = linear_solver(assembly, free, self.flat_coordinates)
-        return Pattern(blocks, free.count, assembly, solver)
+        return MatrixPattern(blocks, free.count, assembly, solver)
 
     @property
     def energies(self) -> Potential:

@@ -105,7 +105,7 @@ class RodLoads:
         load = np.zeros((rod.block_count, 3)) if self.gravity is None else rod.weight(self.gravity)
         if isinstance(self.forces, Mapping):
             for node, force in self.forces.items():
-                load[index_of(node, rod.node_count, "node")] += vector(f"the force on node {node}", force)
+                load[_index_of(node, rod.node_count, "node")] += vector(f"the force on node {node}", force)
         else:
             load[rod.nodes] += finite("the forces on all nodes", self.forces, rod.node_count, 3)
         if self.moments and not rod.twists:
@@ -117,7 +117,7 @@ class RodLoads:
                     raise InputError(f'the moment at "{place}" needs a clamp there that spins: spinning=("{place}",)')
                 load[rod.ghost_angles[rod.clamps.index(place)], 0] += moment
             else:
-                load[rod.node_count + index_of(place, rod.edge_count, "edge"), 0] += moment
+                load[rod.node_count + _index_of(place, rod.edge_count, "edge"), 0] += moment
         return load
 
 
@@ -142,10 +142,10 @@ class SupportPath:
             if rod.twists and rod.clamps[k] not in wanted.spinning:
                 goals[int(rod.ghost_angles[k])] = state[rod.ghost_angles[k]]
         for node, goal in wanted.positions.items():
-            block = index_of(node, rod.node_count, "node")
+            block = _index_of(node, rod.node_count, "node")
             goals[block] = state[block] if goal is None else vector(f"the position of node {node}", goal)
         for edge, angle in wanted.angles.items():
-            goals[rod.node_count + index_of(edge, rod.edge_count, "edge")] = _about(f"the angle of edge {edge}", angle)
+            goals[rod.node_count + _index_of(edge, rod.edge_count, "edge")] = _about(f"the angle of edge {edge}", angle)
         clamps = tuple(_TurningClamp.of(rod, state, k, goals, wanted) for k in range(len(rod.clamps)))
         holds_spin = rod.twists and rod.free_spin and not any(block >= rod.node_count for block in goals)
         if holds_spin:
@@ -153,7 +153,7 @@ class SupportPath:
         moved = np.array(list(goals), dtype=np.intp)
         free = rod.freedom()
         for node, directions in wanted.along.items():
-            block = index_of(node, rod.node_count, "node")
+            block = _index_of(node, rod.node_count, "node")
             free = free.with_directions(np.array([block]), *_orthonormal(node, directions))
         spins = [int(rod.ghost_angles[rod.clamps.index(end)]) for end in wanted.spinning]
         free = free.with_directions(np.array(spins, dtype=np.intp), ANGLE).with_directions(moved)
@@ -223,7 +223,7 @@ def _orthonormal(node: int, directions: Sequence[tuple[float, float, float]]) ->
     return directions
 
 
-def index_of(given: int, count: int, what: str) -> int:
+def _index_of(given: int, count: int, what: str) -> int:
     """An index from 0 to `count` - 1 of one that may count from the end; InputError where there is no such `what`, a
     "node" or an "edge"."""
     if not isinstance(given, int | np.integer):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rodshell.arrays import Floats
-from rodshell.solve.problem import Pattern
+from rodshell.solve.problem import MatrixPattern
 from rodshell.solve.sparse_ldl import Factors, SingularError
 from rodshell.solve.tangent import subspace_iteration
 
@@ -22,7 +22,7 @@ class ShiftedMatrix:
         negative_modes: of the matrix as it was given, not shifted; a mode without stiffness counts as a negative one.
     """
 
-    def __init__(self, pattern: Pattern, units: Floats) -> None:
+    def __init__(self, pattern: MatrixPattern, units: Floats) -> None:
         self._pattern, self._units = pattern, units
         self.values = np.empty(0)
         self._factors: Factors | None = None

@@ -114,7 +114,7 @@ class TimeSeries:
         return cls(np.array(times[:count]), rest[0][:count], rest[1][:count], np.array(rest[2][:count]))
 
 
-class Recorder:
+class _Recorder:
     """Room for `rows` samples, in memory or as one .npy file each in a folder, which holds none yet.
 
     A row counts once its time is written, which is last: a kill leaves complete rows only.
@@ -239,7 +239,7 @@ def simulate(
     begun, end = clock.perf_counter(), End.FINISHED
     grid, first = _Grid(start, (until - start) / count), Sample(start, state.copy(), velocity.copy(), motion.in_parts())
     march = _March(ImplicitEuler() if stepper is None else stepper, grid, first, halvings)
-    recorder = Recorder(samples, state.shape, folder)
+    recorder = _Recorder(samples, state.shape, folder)
 
     def record() -> None:
         recorder.add(march.sample)

@@ -98,7 +98,7 @@ def plan_of(indptr: Longs, blocks: Blocks, order: Longs) -> Plan:
 
 
 @njit()
-def start_after(count, start):  # type: ignore[no-untyped-def]
+def _start_after(count, start):  # type: ignore[no-untyped-def]
     """Where each of some runs starts, `start` (n + 1,), that lie one after the other and have `count` (n,) entries."""
     start[0] = 0
     for k in range(len(count)):
@@ -142,7 +142,7 @@ def _coupled(indptr, begin, row_start, rows):  # type: ignore[no-untyped-def]
         above[b] = indptr[begin[b] + 1] - indptr[begin[b]] - 1
     for a in rows:
         count[a] += 1
-    start_after(count, start)
+    _start_after(count, start)
     neighbours, source, place = np.empty(start[n], dtype=np.int64), np.empty(start[n], dtype=np.int64), count
     for b in range(n):
         place[b] = start[b]
@@ -307,7 +307,7 @@ def _children(parent, first):  # type: ignore[no-untyped-def]
         up[s] = owner[p] if p >= 0 else -1
         if p >= 0:
             filled[owner[p]] += 1
-    start_after(filled, start)
+    _start_after(filled, start)
     children = np.empty(start[supers], dtype=np.int64)
     for s in range(supers):
         filled[s] = start[s]
@@ -349,7 +349,7 @@ def _fronts(first, start, earlier, up):  # type: ignore[no-untyped-def]
                     used[s] += 1
                     s = up[s]
         if sweep == 0:
-            start_after(used, row_start)
+            _start_after(used, row_start)
             rows = np.empty(row_start[supers], dtype=np.int64)
     return row_start, rows
 
@@ -361,7 +361,7 @@ def _maps(  # type: ignore[no-untyped-def]
     """From blocks to unknowns: all that `Plan` holds but the children."""
     supers, n, unknowns, values = len(first) - 1, len(order), begin[len(begin) - 1], indptr[len(indptr) - 1]
     column, place = np.empty(n + 1, dtype=np.int64), np.empty(n, dtype=np.int64)
-    start_after(weight, column)  # first permuted unknown of each block
+    _start_after(weight, column)  # first permuted unknown of each block
     first_column, width_of = np.empty(supers + 1, dtype=np.int64), np.empty(supers, dtype=np.int64)
     original = np.empty(unknowns, dtype=np.int64)
     for k in range(n):
@@ -419,8 +419,8 @@ def _maps(  # type: ignore[no-untyped-def]
                     at += above[right] + c + 1
         entry_start[s + 1] = entry
     first_column[supers] = column[n]
-    part_start, parts = parts_of(up, width_of, below)
-    update_start, deepest = stacks_of(up, below, child_start, children, part_start, parts)
+    part_start, parts = _parts_of(up, width_of, below)
+    update_start, deepest = _stacks_of(up, below, child_start, children, part_start, parts)
     return (
         original, first_column, all_start, all_rows, run_start, runs, entry_start, entry_source, entry_place,
         panel_start, update_start, part_start, parts, deepest, largest, widest,
@@ -432,7 +432,7 @@ WORTHWHILE = 1e8  # multiplications from which on work is shared
 
 
 @njit(inline="always")
-def parts_of(up, width, below):  # type: ignore[no-untyped-def]
+def _parts_of(up, width, below):  # type: ignore[no-untyped-def]
     """Subtrees of at most a `SHARE` of the work each, every one a part; and last what lies above them.
 
     Args:
@@ -470,8 +470,8 @@ def parts_of(up, width, below):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def stacks_of(up, below, child_start, children, part_start, parts):  # type: ignore[no-untyped-def]
-    """Where update matrices lie, and room for all; arguments as of `parts_of` and `Plan`.
+def _stacks_of(up, below, child_start, children, part_start, parts):  # type: ignore[no-untyped-def]
+    """Where update matrices lie, and room for all; arguments as of `_parts_of` and `Plan`.
 
     Each part has two stacks, for even and for odd depths of the tree: what a supernode reads, its children's, and what
     it writes are then never on the same stack, and the children's lie on top of theirs. The last that a part writes

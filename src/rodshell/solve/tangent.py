@@ -18,7 +18,7 @@ from rodshell.errors import InputError
 from rodshell.model import Freedom
 from rodshell.model.potential import product, room_for
 from rodshell.rods.elements import evaluate_all, is_stressed
-from rodshell.solve.problem import NO_CURVATURE, Pattern, Problem
+from rodshell.solve.problem import NO_CURVATURE, MatrixPattern, Problem
 from rodshell.solve.sparse_ldl import Factors, SingularError
 
 GUARDS = 4  # vectors of the subspace iteration beyond the modes that are asked for
@@ -61,7 +61,7 @@ class Tangent:
     forces: Floats
     freedom: Freedom
     values: Floats
-    pattern: Pattern
+    pattern: MatrixPattern
     factors: Factors
 
     @property

@@ -19,8 +19,8 @@ from rodshell.output.grid import CAPTIONS, Shape, supported
 from rodshell.output.sections import section_outline
 from rodshell.output.viewer.scene import Coloured, Drawn, scene_of
 from rodshell.results import Archive, wording
+from rodshell.results.facts import facts as facts_of
 from rodshell.results.from_form import rod_type
-from rodshell.results.verdict import facts as facts_of
 from rodshell.schema import written
 from rodshell.targets import Target
 from rodshell.targets.surface_mesh import BEYOND, surface_mesh

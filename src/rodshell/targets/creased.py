@@ -12,7 +12,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.curves import arc_lengths
 from rodshell.progress import Progress, silent
 from rodshell.targets.creases import KINK, NEAR
-from rodshell.targets.field_fitting import Fit
+from rodshell.targets.field_fitting import FittedField
 from rodshell.targets.freeform import TIE, Freeform
 from rodshell.targets.patch import Seam
 from rodshell.targets.target import Deviation, Implicit, Target
@@ -74,7 +74,7 @@ class Creased(Freeform):
         return value, gradient
 
     @cached_property
-    def _fitted(self) -> Fit:
+    def _fitted(self) -> FittedField:
         raise NotImplementedError("each piece has a field of its own")
 
     def _filled(self, x: Floats) -> Bools:

@@ -44,7 +44,7 @@ def cubic_spacing(area: float, count: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class FittedField:
     """A smooth field that was fitted to a mesh.
 
     Args:
@@ -58,7 +58,7 @@ class Fit:
     off: Floats
 
 
-def fit_mesh(mesh: TriangleMesh, *, size: float, progress: Progress = silent) -> Fit:
+def fit_mesh(mesh: TriangleMesh, *, size: float, progress: Progress = silent) -> FittedField:
     """Fit a field to a mesh, with as many cubics as its shape needs.
 
     As many as suit a mesh that is as fine everywhere; where a vertex is further off than `CLOSE`, twice as many each
@@ -85,7 +85,7 @@ def fit_mesh(mesh: TriangleMesh, *, size: float, progress: Progress = silent) ->
     return best
 
 
-def _fit_at(mesh: TriangleMesh, spacing: float, size: float, progress: Progress) -> Fit:
+def _fit_at(mesh: TriangleMesh, spacing: float, size: float, progress: Progress) -> FittedField:
     fitting = partial(progress, "preparing", f"fit of the mesh, cubics {length_text(spacing)} apart", 0.0)
     fitting()
     samples = fill_openings(mesh, mesh_samples(mesh, spacing), spacing)
@@ -96,7 +96,7 @@ def _fit_at(mesh: TriangleMesh, spacing: float, size: float, progress: Progress)
     slope = np.linalg.norm(gradient, axis=1)
     follows = (dot(gradient, mesh.normals) > ASKEW * slope) & np.isfinite(value)
     follows[_crossed(mesh, samples, LONGEST * spacing)] = False
-    return Fit(field, cubics, np.where(follows, np.abs(value), np.inf))
+    return FittedField(field, cubics, np.where(follows, np.abs(value), np.inf))
 
 
 def _crossed(mesh: TriangleMesh, samples: Samples, reach: float) -> Ints:

@@ -13,7 +13,7 @@ from rodshell.errors import InputError
 from rodshell.geometry.frames import cross, dot, unit
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.targets.creases import Creases
-from rodshell.targets.field_fitting import OFF, Fit, fit_mesh
+from rodshell.targets.field_fitting import OFF, FittedField, fit_mesh
 from rodshell.targets.rim import UPRIGHT, Given, Rim, smooth_loop
 from rodshell.targets.smooth_field import SmoothField
 from rodshell.targets.target import Deviation, Gap, Implicit, Target
@@ -179,10 +179,10 @@ class Freeform(Target):
         return 0.5 * float(np.ptp(self.surface.vertices, axis=0).max())
 
     @cached_property
-    def _fitted(self) -> Fit:
+    def _fitted(self) -> FittedField:
         return self.fit()
 
-    def fit(self, progress: Progress = silent) -> Fit:
+    def fit(self, progress: Progress = silent) -> FittedField:
         """Fit its field now, which else is fitted when it is needed first; `progress` is called at each step."""
         self.require_usable()
         self.__dict__["_fitted"] = fitted = fit_mesh(self.surface, size=self._extent, progress=progress)

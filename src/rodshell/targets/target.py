@@ -154,7 +154,7 @@ class Target(ABC):
         for small gaps this leads near the closest points."""
         x = np.ascontiguousarray(x)
         for _ in range(steps):
-            x, furthest = along_gradient(x, *self.level(x))
+            x, furthest = _along_gradient(x, *self.level(x))
             if furthest <= _NEARLY * self.size:
                 break
         return x
@@ -334,7 +334,7 @@ def newton_to_closest(x, y, rows, value, gradient, hessian, damping, longest, sl
 
 
 @njit("f2 f1 f2")
-def along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
+def _along_gradient(x, value, gradient):  # type: ignore[no-untyped-def]
     """One step of Newton from points x (n, 3) [m] to F = 0 along the gradient, and the largest |F| before it."""
     result, furthest = np.empty((len(x), 3)), 0.0
     for m in range(len(x)):

@@ -362,7 +362,7 @@ def _volume(mesh: TriangleMesh) -> float:
     return float(dot(mesh.vertices[mesh.faces[:, 0]] - centre, mesh.doubled).sum())
 
 
-def turns_at(mesh: TriangleMesh, neighbours: Neighbours) -> Floats:
+def _turns_at(mesh: TriangleMesh, neighbours: Neighbours) -> Floats:
     """Cosines (e,) of the angles by which a mesh turns at the edges between two faces, and from what is on one side of
     them to what is on the other: the larger of both."""
     i, j = neighbours.faces.T
@@ -380,7 +380,7 @@ def turns_at(mesh: TriangleMesh, neighbours: Neighbours) -> Floats:
 def smooth_piece(mesh: TriangleMesh, neighbours: Neighbours, name: str) -> SoundMesh:
     """Of a mesh whose faces are oriented alike the piece between creases that covers most of the plan, facing up."""
     i, j = neighbours.faces.T
-    cosine = turns_at(mesh, neighbours)
+    cosine = _turns_at(mesh, neighbours)
     smooth = cosine > cos(radians(CREASE))
     closed = not len(mesh.loops)
     pieces = neighbours.pieces(smooth, len(mesh.faces))

@@ -19,7 +19,7 @@ from rodshell.output.grid import beams_along_edge, end_nodes, joint_places, mesh
 from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
-from rodshell.results.verdict import unknown_below
+from rodshell.results.judged.deployment import unknown_below
 from rodshell.results.wording import Rounding, rounding_of, whole_percent
 
 _SUPPORTS_LEGEND = (

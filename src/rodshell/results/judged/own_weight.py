@@ -12,9 +12,10 @@ from rodshell.figures.checks import SelfWeight
 from rodshell.figures.findings import Said, said
 from rodshell.figures.form import RodType
 from rodshell.figures.records import Ends
+from rodshell.results.judged.loads import is_braced
+from rodshell.results.judged.stress import THIN, bent_of, holds_while_erected, strength_name
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import half_sides, sizes_sold
-from rodshell.results.strength_used import THIN, bent_of, holds_while_erected, strength_name
 from rodshell.results.wording import FORM_AGAIN, part_of_weight, percent, rounded, rounded_down, shown_factor
 from rodshell.rods.section import Section, size_text
 from rodshell.schema import written
@@ -140,11 +141,6 @@ def _asked(results: Results) -> str:
         )
     creeps = "creep, " * (creep is None)
     return f"{rounded(asked)} times are asked for, of which {creeps}imperfections and supports that yield take a part"
-
-
-def is_braced(results: Results) -> bool:
-    """Whether the shell has bracing under its loads; its own weight alone is checked without."""
-    return any(shell.bracing for _, _, shell in results.loaded_shells())
 
 
 def _parts(factors: Mapping[Ends, float], of: str = "it") -> str:
