@@ -34,6 +34,19 @@ class Combination:
     deflection: Annotated[PartOfSpan | None, 'how far a node may move: a length, or "span/200"'] = None
 
 
+OWN, ACTING = 1.35, 1.5  # factors of permanent loads and of others [EN 1990, table A1.2(B), set B]
+
+
+def usual_loads(snow: str | None = None) -> dict[str, object]:
+    """Own weight, and snow where there is some, in the usual combinations: overrides for a case."""
+    own = {"name": "own", "kind": "self_weight"}
+    loads, combinations = [own], [{"name": "permanent", "factors": {"own": OWN}}]
+    if snow is not None:
+        loads.append({"name": "snow", "kind": "snow", "value": snow})
+        combinations.append({"name": "winter", "factors": {"own": OWN, "snow": ACTING}})
+    return {"loads": loads, "combinations": combinations}
+
+
 @dataclass(frozen=True)
 class NoBracing:
     kind: ClassVar = "none"

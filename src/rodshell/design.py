@@ -1,0 +1,362 @@
+"""Design to load: section, bracing and spacing, as far as a case leaves them open, so that the shell carries its loads.
+
+The shape of a shell hardly depends on the size of its rods, and its strains are in proportion to their depth. So there
+is a thickest size that is sold which the bends of a spacing allow, and each thinner one carries less: one section a
+spacing counts, and what it does not carry is up to the bracing and to a closer spacing. From wide to close, without
+bracing, with cables, with laths, the first that stands is taken.
+
+A design is popped up from the one before, braced, and judged by its strength and by linear buckling, which takes a few
+factorisations. Imperfections leave a share of the linear factor that differs little between designs of one bracing: it
+says of which the path is followed, and all checks are made of those that stand then.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from math import inf
+
+from rodshell.case import Case
+from rodshell.case.load_tables import BracingKinds, NoBracing
+from rodshell.case.rod_tables import RodTable
+from rodshell.case.stage_tables import DesignTable, LayoutTable
+from rodshell.checks.sizing import ROOM
+from rodshell.errors import ConvergenceError, InputError, NetLimitError, OutOfTimeError
+from rodshell.figures.design import Design, DesignStep
+from rodshell.form import Form
+from rodshell.loads.check import Estimate, check_shells, estimate
+from rodshell.loads.settings import Cables, Laths
+from rodshell.progress import Progress
+from rodshell.results.load_reserve import least_carried
+from rodshell.results.wording import percent, rounded, rounded_down
+from rodshell.rods.materials import Material
+from rodshell.rods.section import TRADE_SIZES, Circle, Rod, Section, size_text
+from rodshell.rods.supports import BOTH, PINNED
+from rodshell.schema import read
+from rodshell.units import length_text
+
+SPACINGS = (1.0, 0.85, 0.7, 0.55, 0.45)  # of the spacing that is taken where none is given
+LEFT = {"none": 1.0, "cables": 0.42, "laths": 0.7}  # share of the linear factor that imperfections leave, at first:
+# .28 to .49 of cables and .55 to .89 of laths on domes of 6 and 12 m
+LIKELY = 1.15  # a path is followed if the reserve may be reached by so much more than is estimated
+PRESTRAIN, ROPE, THIN_ROPE, THIN = (
+    5e-4,
+    0.006,
+    0.004,
+    0.025,
+)  # of cables; the thin ones are of rods up to that depth [m]
+ROPE_MODULUS = 160e9  # Pa: of strands
+CREEP = {"gfrp": 0.3}  # assumed, of pultruded profiles along their fibres: their makers know
+OF_SIZE = ("strength", "erection_strength", "too_thick", "erection_too_thick", "strength_under_loads")
+OF_STIFFNESS = (
+    "falls_under_loads", "imperfect", "falls_after_years", "reserve_under_loads", "falls", "reserve", "needs_bracing",
+    "strength_of_bracing", "linear_buckling", "low_stiffness", "deflection", "sinks", "unstable",
+)  # fmt: skip
+"""Findings that thinner rods may mend, and those that another bracing or a closer spacing may."""
+
+Runs = Callable[[Case, Form | None], Form]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A design."""
+
+    section: Section
+    bracing: str
+    spacing: float
+
+    def __str__(self) -> str:
+        braced = {"none": "without bracing", "given": "with its bracing"}.get(self.bracing, f"with {self.bracing}")
+        return f"{size_text(self.section)}, {braced}, {length_text(self.spacing)} apart"
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A design that was popped up, and what is known of it."""
+
+    candidate: Candidate
+    form: Form
+    known: Estimate
+
+    @property
+    def used(self) -> float:
+        return self.known.used or 0.0
+
+    @property
+    def linear(self) -> float:
+        return min(self.known.linear.values())
+
+
+@dataclass(eq=False)
+class Search:
+    """The search for a design.
+
+    Args:
+        asked: the case, with what is open.
+        run: runs a case up to its pop-up, from an earlier form.
+        announce: called with a sentence for each step.
+    """
+
+    asked: Case
+    run: Runs
+    progress: Progress
+    announce: Callable[[str], None]
+    steps: list[DesignStep] = field(default_factory=list)
+    left: dict[str, float] = field(default_factory=lambda: dict(LEFT))
+    deepest: float = inf
+    best: Tried | None = None
+    best_factor: float = -1.0
+    last: Form | None = None
+
+    def __post_init__(self) -> None:
+        self.base, self.sections, self.start = self._prepared()
+        loads = self.base.built_loads()
+        assert loads is not None
+        self.loads, self.reserve = loads, loads.stability.reserve
+
+    def form(self) -> Form:
+        """The first design that stands, or the one that comes nearest, with what stands in the way."""
+        limits = ""
+        try:
+            for spacing, bracing in self._grids():
+                if (found := self._stands(spacing, bracing)) is not None:
+                    return self._made(found, "")
+            limits = self._limits()
+        except OutOfTimeError as late:
+            if self.best is None:
+                raise
+            limits = str(late)
+        if self.best is None:
+            raise InputError(f"no design could be popped up: {self.steps[-1].said if self.steps else limits}")
+        self.announce(f"design: no size that is sold stands: {limits}")
+        return self._made(self.best.form.finished(self.progress), limits)
+
+    def _grids(self) -> Iterator[tuple[float, str]]:
+        """Spacings, and how each is braced."""
+        spacings: Iterable[float] = (self.start.spacing,)
+        if "spacing" in self.asked.design.open:
+            spacings = (float(f"{share * self.start.spacing:.2g}") for share in SPACINGS)
+        bracings = ("none", "cables", "laths") if "bracing" in self.asked.design.open else ("given",)
+        yield from ((spacing, bracing) for spacing in spacings for bracing in bracings)
+
+    def _stands(self, spacing: float, bracing: str) -> Form | None:
+        """The design of this spacing and bracing with all checks, if it stands."""
+        while (tried := self._thickest(spacing, bracing)) is not None:
+            share = self.left.get(bracing, 1.0)
+            guess = share * tried.linear
+            self._keep(tried, guess)
+            if tried.known.bare < 1:
+                self._say(tried, "estimate", tried.known.bare, "falls under its own weight before it is braced")
+                return None
+            if guess * LIKELY < self.reserve:
+                self._say(tried, "estimate", guess, f"may carry {rounded_down(guess)} times the loads")
+                return None
+            factor, used, braced = self._followed(tried)
+            self.left[bracing] = factor / tried.linear
+            self._keep(tried, factor)
+            if factor < self.reserve or braced > 1:
+                weak = f", and its bracing uses {percent(braced)} of its strength" if braced > 1 else ""
+                self._say(tried, "path", factor, f"carries {rounded_down(factor)} times the loads{weak}", used)
+                return None
+            if used > 1:
+                self._say(tried, "path", factor, f"uses {percent(used)} of its strength under the loads", used)
+                self.deepest = tried.candidate.section.depth / used
+                continue
+            form = tried.form.finished(self.progress)
+            codes = {finding.code: finding for finding in form.verdict.findings if finding.level != "good"}
+            named = ", ".join(codes)
+            if too_thick := [codes[code] for code in OF_SIZE if code in codes]:
+                worst = max((each.figure or inf) / (each.limit or 1.0) for each in too_thick)
+                self._say(tried, "checks", factor, f"is too thick for its bends ({named})", worst)
+                self.deepest = tried.candidate.section.depth / worst
+                continue
+            if any(code in codes for code in OF_STIFFNESS):
+                self._say(tried, "checks", factor, f"does not pass all checks ({named})", used)
+                return None
+            left = f"stands; to be checked: {named}" if codes else "stands"
+            self._say(tried, "checks", factor, f"{left}, {rounded_down(factor)} times the loads", used)
+            return form
+        return None
+
+    def _thickest(self, spacing: float, bracing: str) -> Tried | None:
+        """The thickest section that the bends allow; None: none, or the shell was not found."""
+        most = min(ROOM * spacing, self.deepest)
+        allowed = [k for k, section in enumerate(self.sections) if section.depth <= most * (1 + 1e-9)]
+        if "section" not in self.asked.design.open:
+            allowed = [0]
+        tried, k = dict[int, Tried | None](), min(self._first, max(allowed, default=0))
+        while allowed and k not in tried:
+            tried[k] = self._tried(Candidate(self.sections[k], bracing, spacing))
+            if (found := tried[k]) is None:
+                break
+            depth = self.sections[k].depth / (found.used or 1.0)
+            k = max((j for j in allowed if self.sections[j].depth <= depth * (1 + 1e-9)), default=allowed[0])
+        fitting = [k for k, found in tried.items() if found is not None and found.used <= 1]
+        if not fitting:
+            if any(tried.values()):
+                self._say(next(filter(None, tried.values())), "estimate", None, "is too thick for its sharpest bend")
+            return None
+        self._first = max(fitting)
+        return tried[self._first]
+
+    def _tried(self, candidate: Candidate) -> Tried | None:
+        """A design popped up and braced, and the estimate of what it carries."""
+        case = self._case(candidate)
+        try:
+            form = self.run(case, self.last)
+            if form.status != "converged":
+                raise ConvergenceError(form.status)
+            loads = case.built_loads()
+            assert loads is not None
+            found = Tried(
+                candidate, form, estimate(form.stages, loads, limits=form.options.limits(form.rod, loads.strength))
+            )
+        except (InputError, ConvergenceError, NetLimitError) as reason:
+            step = DesignStep(
+                section=size_text(candidate.section), bracing=candidate.bracing, spacing=candidate.spacing,
+                known_by="estimate", said=f"was not found: {reason}",
+            )  # fmt: skip
+            self.steps.append(step)
+            self.announce(f"design: {candidate}: {step.said}")
+            return None
+        self.last = form
+        return found
+
+    def _followed(self, tried: Tried) -> tuple[float, float, float]:
+        """How many times its worst combination a design carries with one mode as imperfection, and what of their
+        strength rods and bracing use under it."""
+        loads = tried.form.case.built_loads()
+        assert loads is not None
+        name = min(tried.known.linear, key=lambda each: tried.known.linear[each])
+        few = replace(
+            loads, combinations={name: loads.combinations[name]}, deflections={},
+            stability=replace(loads.stability, modes=1),
+        )  # fmt: skip
+        form = tried.form
+        limits = form.options.limits(form.rod, loads.strength)
+        checks = check_shells(form.stages, few, limits=limits, progress=self.progress)
+        if checks.stopped:
+            raise OutOfTimeError(checks.stopped)
+        shell = next(iter(checks.shells[name].values()))
+        return least_carried(shell)[0], shell.utilisation or 0.0, shell.bracing_utilisation or 0.0
+
+    def _keep(self, tried: Tried, factor: float) -> None:
+        if factor > self.best_factor or (self.best is not None and tried.candidate == self.best.candidate):
+            self.best, self.best_factor = tried, factor
+
+    def _say(self, tried: Tried, known_by: str, factor: float | None, said: str, used: float | None = None) -> None:
+        """Keep a step and announce it."""
+        used = tried.known.used if used is None else used
+        step = DesignStep(
+            section=size_text(tried.candidate.section), bracing=tried.candidate.bracing,
+            spacing=tried.candidate.spacing, known_by=known_by, factor=factor, used=used, said=said,
+        )  # fmt: skip
+        self.steps.append(step)
+        share = "" if used is None else f", {percent(used)} of the strength"
+        self.announce(f"design: {tried.candidate}: {said}{share}")
+
+    def _limits(self) -> str:
+        """What stands in the way of the best design: its strength and the size that would carry the loads."""
+        best = self.best
+        if best is None:
+            return "the thinnest is too thick for the sharpest bend"
+        kind, share = best.candidate.bracing, self.best_factor / best.linear
+        thicker = [section for section in self.sections if section.depth > best.candidate.section.depth]
+        for section in thicker:
+            found = self._tried(replace(best.candidate, section=section))
+            if found is None:
+                break
+            if share * found.linear >= self.reserve:
+                x, y = found.known.place
+                radius = found.known.radius
+                also = {"none": ", or brace it"}.get(kind, "")
+                return (
+                    f"strength: the radius of {rounded(radius)} m at {x:.3g}, {y:.3g} m allows "
+                    f"{size_text(best.candidate.section)}, stability asks for {size_text(section)}: make it flatter "
+                    f"than {rounded(radius * found.used)} m there{also}"
+                )
+        return (
+            f"stability: {best.candidate}, carries {rounded_down(self.best_factor)} times the loads of {self.reserve:g}"
+        )
+
+    def _made(self, form: Form, limits: str) -> Form:
+        """The form of the design, as one of the case that was asked for."""
+        assumed = None if self.asked.strength == self.base.strength else self.base.strength.creep
+        design = Design(
+            open=self.asked.design.open, found=not limits, limits=limits, steps=tuple(self.steps), assumed_creep=assumed
+        )
+        return replace(form, asked=self.asked, design=design).knowing(
+            checks=form.known_checks, fabrication=form.known_fabrication, loaded=form.known_loaded
+        )
+
+    def _case(self, candidate: Candidate) -> Case:
+        """The case of a candidate, with nothing open."""
+        case, asked = self.base, self.asked.design.open
+        if "section" in asked:
+            case = replace(case, rod=read(RodTable, Rod(candidate.section, self.material).parameters()))
+        if "spacing" in asked:
+            assert isinstance(case.layout, LayoutTable)
+            case = replace(case, layout=replace(case.layout, spacing=(candidate.spacing,) * 2))
+        if "bracing" in asked:
+            case = replace(case, bracing=bracing_of(candidate))
+        return case
+
+    def _prepared(self) -> tuple[Case, tuple[Section, ...], Candidate]:
+        """The case with what the search decides at once; the sections to choose from; where to begin."""
+        asked = self.asked
+        _require(asked)
+        case = replace(asked, design=DesignTable())
+        if case.pop_up.ends == BOTH and not case.supports and case.pop_up.held is None:
+            case = replace(case, pop_up=replace(case.pop_up, ends=PINNED.name))
+        built = case.build(progress=self.progress)
+        rod, spacing = built.rod, built.layout.least_spacing
+        self.material = rod.material
+        if case.strength.creep is None and rod.material is not None and rod.material.name in CREEP:
+            creep = CREEP[rod.material.name]
+            case = replace(case, strength=replace(case.strength, creep=creep))
+            self.announce(f"creep of {rod.material.name} taken as {creep:g}: ask its maker (strength.creep)")
+        sections: tuple[Section, ...] = (rod.section,)
+        self._first = 0
+        if "section" in asked.design.open:
+            assert rod.material is not None
+            sections = TRADE_SIZES.get(rod.material.name or "rubber", ())  # type: ignore[call-overload]
+            if not sections:
+                raise InputError(
+                    "design.open has the section, and no sizes of this material are known: give rod.material.preset, "
+                    "or rod.section"
+                )
+            self._first = max((k for k, each in enumerate(sections) if each.depth <= rod.section.depth), default=0)
+        return case, sections, Candidate(rod.section, "none", spacing)
+
+
+def bracing_of(candidate: Candidate) -> BracingKinds:
+    """The bracing of a candidate: none, ropes both ways to the supports, or a third layer of its laths."""
+    if candidate.bracing == "none":
+        return NoBracing()
+    if candidate.bracing == "laths":
+        return Laths()
+    steel = Material.preset("spring-steel", youngs_modulus=ROPE_MODULUS)
+    rope = Circle((ROPE if candidate.section.depth > THIN else THIN_ROPE) / 2)
+    return Cables(pattern="both", prestrain=PRESTRAIN, ends_at="supports", rod=Rod(rope, steel))
+
+
+def _require(asked: Case) -> None:
+    """InputError where what is to be chosen is given, or there are no loads to choose it by."""
+    if asked.built_loads() is None:
+        raise InputError('design.open needs loads: give [[loads]] and [[combinations]], or --snow "0.5 kN/m2"')
+    given = {
+        "section": "section" not in asked.rod.left_open or asked.rod.held is not None,
+        "bracing": asked.bracing.kind != "none",
+        "spacing": not isinstance(asked.layout, LayoutTable) or asked.layout.spacing != "auto",
+    }
+    keys = {"section": "rod.section", "bracing": "bracing", "spacing": "layout.spacing"}
+    for name in asked.design.open:
+        if given[name]:
+            raise InputError(f"design.open has {name}, which is given ({keys[name]}): leave one of them out")
+
+
+def designed(asked: Case, run: Runs, progress: Progress, announce: Callable[[str], None]) -> Form:
+    """The form of a case whose `design.open` names what its loads decide, with all checks.
+
+    Raises:
+        InputError: it has no loads, or what is open is given; no design could be popped up.
+    """
+    return Search(asked, run, progress, announce).form()
