@@ -18,10 +18,10 @@ from rodshell.case import Case
 from rodshell.case.load_tables import BracingKinds, NoBracing
 from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import DesignTable, LayoutTable
-from rodshell.checks.sizing import ROOM
 from rodshell.errors import ConvergenceError, InputError, NetLimitError, OutOfTimeError
-from rodshell.figures.design import Design, DesignStep
+from rodshell.figures.design import Design, DesignStep, KnownBy
 from rodshell.form import Form
+from rodshell.formfinding.finite_sections import CLOSE
 from rodshell.loads.check import Estimate, check_shells, estimate
 from rodshell.loads.settings import Cables, Laths
 from rodshell.progress import Progress
@@ -31,11 +31,16 @@ from rodshell.rods.materials import Material
 from rodshell.rods.section import TRADE_SIZES, Circle, Rod, Section, size_text
 from rodshell.rods.supports import BOTH, PINNED
 from rodshell.schema import read
-from rodshell.units import length_text
 
-SPACINGS = (1.0, 0.85, 0.7, 0.55, 0.45)  # of the spacing that is taken where none is given
-LEFT = {"none": 1.0, "cables": 0.42, "laths": 0.7}  # share of the linear factor that imperfections leave, at first:
+SPACINGS = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35)  # of the spacing that is taken where none is given
+LEFT = {
+    "none": 1.0,
+    "cables": 0.42,
+    "laths": 0.7,
+    "laths both ways": 0.7,
+}  # share of the linear factor that imperfections leave, at first:
 # .28 to .49 of cables and .55 to .89 of laths on domes of 6 and 12 m
+GAIN = 1.5  # exponent of the spacing's inverse by which factors grow at most: .9 to 1.3 were measured
 LIKELY = 1.15  # a path is followed if the reserve may be reached by so much more than is estimated
 PRESTRAIN, ROPE, THIN_ROPE, THIN = (
     5e-4,
@@ -62,10 +67,6 @@ class Candidate:
     section: Section
     bracing: str
     spacing: float
-
-    def __str__(self) -> str:
-        braced = {"none": "without bracing", "given": "with its bracing"}.get(self.bracing, f"with {self.bracing}")
-        return f"{size_text(self.section)}, {braced}, {length_text(self.spacing)} apart"
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +102,7 @@ class Search:
     announce: Callable[[str], None]
     steps: list[DesignStep] = field(default_factory=list)
     left: dict[str, float] = field(default_factory=lambda: dict(LEFT))
+    hope: dict[str, float] = field(default_factory=dict)
     deepest: float = inf
     best: Tried | None = None
     best_factor: float = -1.0
@@ -134,8 +136,12 @@ class Search:
         spacings: Iterable[float] = (self.start.spacing,)
         if "spacing" in self.asked.design.open:
             spacings = (float(f"{share * self.start.spacing:.2g}") for share in SPACINGS)
-        bracings = ("none", "cables", "laths") if "bracing" in self.asked.design.open else ("given",)
-        yield from ((spacing, bracing) for spacing in spacings for bracing in bracings)
+        bracings = tuple(LEFT) if "bracing" in self.asked.design.open else ("given",)
+        *_, closest = spacings = tuple(spacings)
+        for spacing in spacings:
+            yield from ((spacing, bracing) for bracing in bracings if spacing <= self.hope.get(bracing, inf))
+        if self.hope and closest not in [step.spacing for step in self.steps]:  # what cannot be is shown there
+            yield closest, max(self.hope, key=lambda bracing: self.hope[bracing])
 
     def _stands(self, spacing: float, bracing: str) -> Form | None:
         """The design of this spacing and bracing with all checks, if it stands."""
@@ -143,6 +149,7 @@ class Search:
             share = self.left.get(bracing, 1.0)
             guess = share * tried.linear
             self._keep(tried, guess)
+            self.hope[bracing] = spacing * (guess * LIKELY / self.reserve) ** (1 / GAIN)
             if tried.known.bare < 1:
                 self._say(tried, "estimate", tried.known.bare, "falls under its own weight before it is braced")
                 return None
@@ -152,6 +159,7 @@ class Search:
             factor, used, braced = self._followed(tried)
             self.left[bracing] = factor / tried.linear
             self._keep(tried, factor)
+            self.hope[bracing] = spacing * (factor * LIKELY / self.reserve) ** (1 / GAIN)
             if factor < self.reserve or braced > 1:
                 weak = f", and its bracing uses {percent(braced)} of its strength" if braced > 1 else ""
                 self._say(tried, "path", factor, f"carries {rounded_down(factor)} times the loads{weak}", used)
@@ -178,7 +186,7 @@ class Search:
 
     def _thickest(self, spacing: float, bracing: str) -> Tried | None:
         """The thickest section that the bends allow; None: none, or the shell was not found."""
-        most = min(ROOM * spacing, self.deepest)
+        most = min(CLOSE * spacing, self.deepest)
         allowed = [k for k, section in enumerate(self.sections) if section.depth <= most * (1 + 1e-9)]
         if "section" not in self.asked.design.open:
             allowed = [0]
@@ -204,18 +212,14 @@ class Search:
             form = self.run(case, self.last)
             if form.status != "converged":
                 raise ConvergenceError(form.status)
+            form = replace(form, options=replace(form.options, rod_chosen=self.asked.rod.left_open))
             loads = case.built_loads()
             assert loads is not None
             found = Tried(
                 candidate, form, estimate(form.stages, loads, limits=form.options.limits(form.rod, loads.strength))
             )
         except (InputError, ConvergenceError, NetLimitError) as reason:
-            step = DesignStep(
-                section=size_text(candidate.section), bracing=candidate.bracing, spacing=candidate.spacing,
-                known_by="estimate", said=f"was not found: {reason}",
-            )  # fmt: skip
-            self.steps.append(step)
-            self.announce(f"design: {candidate}: {step.said}")
+            self._add(candidate, "estimate", f"was not found: {reason}")
             return None
         self.last = form
         return found
@@ -242,16 +246,20 @@ class Search:
         if factor > self.best_factor or (self.best is not None and tried.candidate == self.best.candidate):
             self.best, self.best_factor = tried, factor
 
-    def _say(self, tried: Tried, known_by: str, factor: float | None, said: str, used: float | None = None) -> None:
+    def _say(self, tried: Tried, known_by: KnownBy, factor: float | None, said: str, used: float | None = None) -> None:
+        self._add(tried.candidate, known_by, said, factor, tried.known.used if used is None else used)
+
+    def _add(
+        self, tried: Candidate, known_by: KnownBy, said: str, factor: float | None = None, used: float | None = None
+    ) -> None:
         """Keep a step and announce it."""
-        used = tried.known.used if used is None else used
         step = DesignStep(
-            section=size_text(tried.candidate.section), bracing=tried.candidate.bracing,
-            spacing=tried.candidate.spacing, known_by=known_by, factor=factor, used=used, said=said,
+            section=size_text(tried.section), bracing=tried.bracing, spacing=tried.spacing, known_by=known_by,
+            factor=factor, used=used, said=said,
         )  # fmt: skip
         self.steps.append(step)
         share = "" if used is None else f", {percent(used)} of the strength"
-        self.announce(f"design: {tried.candidate}: {said}{share}")
+        self.announce(f"design: {step.words}: {said}{share}")
 
     def _limits(self) -> str:
         """What stands in the way of the best design: its strength and the size that would carry the loads."""
@@ -273,9 +281,7 @@ class Search:
                     f"{size_text(best.candidate.section)}, stability asks for {size_text(section)}: make it flatter "
                     f"than {rounded(radius * found.used)} m there{also}"
                 )
-        return (
-            f"stability: {best.candidate}, carries {rounded_down(self.best_factor)} times the loads of {self.reserve:g}"
-        )
+        return f"stability: no size that is sold carries {rounded(self.reserve)} times the loads"
 
     def _made(self, form: Form, limits: str) -> Form:
         """The form of the design, as one of the case that was asked for."""
@@ -333,6 +339,8 @@ def bracing_of(candidate: Candidate) -> BracingKinds:
         return NoBracing()
     if candidate.bracing == "laths":
         return Laths()
+    if candidate.bracing == "laths both ways":
+        return Laths(pattern="both")
     steel = Material.preset("spring-steel", youngs_modulus=ROPE_MODULUS)
     rope = Circle((ROPE if candidate.section.depth > THIN else THIN_ROPE) / 2)
     return Cables(pattern="both", prestrain=PRESTRAIN, ends_at="supports", rod=Rod(rope, steel))
@@ -342,15 +350,10 @@ def _require(asked: Case) -> None:
     """InputError where what is to be chosen is given, or there are no loads to choose it by."""
     if asked.built_loads() is None:
         raise InputError('design.open needs loads: give [[loads]] and [[combinations]], or --snow "0.5 kN/m2"')
-    given = {
-        "section": "section" not in asked.rod.left_open or asked.rod.held is not None,
-        "bracing": asked.bracing.kind != "none",
-        "spacing": not isinstance(asked.layout, LayoutTable) or asked.layout.spacing != "auto",
-    }
     keys = {"section": "rod.section", "bracing": "bracing", "spacing": "layout.spacing"}
     for name in asked.design.open:
-        if given[name]:
-            raise InputError(f"design.open has {name}, which is given ({keys[name]}): leave one of them out")
+        if name not in asked.left_open:
+            raise InputError(f"design.open has {name}, which the case gives ({keys[name]}): leave one of them out")
 
 
 def designed(asked: Case, run: Runs, progress: Progress, announce: Callable[[str], None]) -> Form:

@@ -18,7 +18,7 @@ import rodshell as rs
 SEED, ROOFS = 45, 40
 SNOW = "0.5 kN/m2"
 KINDS = ("dome", "cap", "bump", "vault")
-AROUND, OUT = 96, 24  # points of a mesh around and outwards
+AROUND, OUT = 240, 24  # points of a mesh around and outwards
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,13 @@ def roof(k: int) -> Roof:
     kind = KINDS[k % len(KINDS)]
     width = float(rng.uniform(4.0, 24.0))
     rise = width * float(rng.uniform(0.12, 0.35))
-    long = 1.0 if kind in ("dome", "cap") else float(rng.uniform(1.0, 1.4)) if kind == "bump" else float(rng.uniform(1.4, 2.2))
+    long = (
+        1.0
+        if kind in ("dome", "cap")
+        else float(rng.uniform(1.0, 1.4))
+        if kind == "bump"
+        else float(rng.uniform(1.4, 2.2))
+    )
     angle = np.linspace(0.0, 2 * np.pi, AROUND, endpoint=False)
     if kind == "vault":  # a superellipse
         c, s = np.cos(angle), np.sin(angle)

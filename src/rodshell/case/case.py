@@ -179,6 +179,17 @@ class Case:
 
         return Fit.on(target, layout, anchor=anchor, joint=self.joint, progress=progress)
 
+    @property
+    def left_open(self) -> tuple[str, ...]:
+        """What loads may decide (`design.open`): section, bracing and spacing, as far as they are not given."""
+        spaced = isinstance(self.layout, LayoutTable) and self.layout.spacing == "auto" and not self.seams.lines
+        left = {
+            "section": self.rod.held is None and "section" in self.rod.left_open,
+            "bracing": self.bracing.kind == "none",
+            "spacing": spaced,
+        }
+        return tuple(name for name, is_open in left.items() if is_open)
+
     def with_rod(self, rod: Rod) -> "Case":
         """The same case with this rod spelled out."""
         if self.rod.held is not None or not self.rod.left_open:

@@ -6,6 +6,8 @@ from pydantic import Field
 
 from rodshell.figures.records import Flag, Number, Record, Rows, Text, key, rows
 
+KnownBy = Literal["estimate", "path", "checks"]
+
 
 class DesignStep(Record):
     """A design that was tried."""
@@ -13,12 +15,18 @@ class DesignStep(Record):
     section: Text = Field(description="of the rods, as it is sold")
     bracing: Text = Field(description="none, cables or laths")
     spacing: Number = key("between neighbouring rods", "m")
-    known_by: Literal["estimate", "path", "checks"] = Field(
+    known_by: KnownBy = Field(
         description="how it was judged: by linear buckling, by the path of one combination, or by all checks"
     )
     factor: Number = key("times the loads that it carries with imperfections, at least; null: not known")
     used: Number = key("share of the design strength that its rods use at most; null: not known")
     said: Text = Field(description="what came of it")
+
+    @property
+    def words(self) -> str:
+        """Section, bracing and spacing."""
+        braced = {"none": "without bracing", "given": "with its bracing"}.get(self.bracing, f"with {self.bracing}")
+        return f"{self.section}, {braced}, rods {round(1e3 * (self.spacing or 0.0))} mm apart"
 
 
 class Design(Record):
