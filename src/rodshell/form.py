@@ -298,7 +298,8 @@ class Form:
 
     def results(self) -> Results:
         """The typed content of result.json before anything was checked."""
-        found = results_of(self.stages).changed(flat_state=self.flat_state, design=self.design)
+        found = results_of(self.stages).changed(flat_state=self.flat_state)
+        found = found if self.design is None else found.changed(design=self.design)
         return found if self.refined is None else with_refinement(found, self.refined)
 
     def unchecked(self) -> Archive:
