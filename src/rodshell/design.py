@@ -24,15 +24,16 @@ from rodshell.form import Form
 from rodshell.formfinding.finite_sections import CLOSE
 from rodshell.loads.check import Estimate, check_shells, estimate
 from rodshell.loads.settings import Cables, Laths
+from rodshell.loads.stability import MOST
 from rodshell.progress import Progress
 from rodshell.results.load_reserve import least_carried
 from rodshell.results.wording import percent, rounded, rounded_down
-from rodshell.rods.materials import Material
-from rodshell.rods.section import TRADE_SIZES, Circle, Rod, Section, size_text
-from rodshell.rods.supports import BOTH, PINNED
+from rodshell.rods.materials import Material, PresetName
+from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, size_text
+from rodshell.rods.supports import BOTH
 from rodshell.schema import read
 
-SPACINGS = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35)  # of the spacing that is taken where none is given
+SPACINGS = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35, 0.3)  # of the spacing that is taken where none is given
 LEFT = {
     "none": 1.0,
     "cables": 0.42,
@@ -40,6 +41,7 @@ LEFT = {
     "laths both ways": 0.7,
 }  # share of the linear factor that imperfections leave, at first:
 # .28 to .49 of cables and .55 to .89 of laths on domes of 6 and 12 m
+NEAR = 1.1  # strains are in proportion to the depth, but for those by the prestress of cables
 GAIN = 1.5  # exponent of the spacing's inverse by which factors grow at most: .9 to 1.3 were measured
 LIKELY = 1.15  # a path is followed if the reserve may be reached by so much more than is estimated
 PRESTRAIN, ROPE, THIN_ROPE, THIN = (
@@ -49,7 +51,7 @@ PRESTRAIN, ROPE, THIN_ROPE, THIN = (
     0.025,
 )  # of cables; the thin ones are of rods up to that depth [m]
 ROPE_MODULUS = 160e9  # Pa: of strands
-CREEP = {"gfrp": 0.3}  # assumed, of pultruded profiles along their fibres: their makers know
+CREEP: dict[PresetName, float] = {"gfrp": 0.3}  # assumed, of pultruded profiles along their fibres: their makers know
 OF_SIZE = ("strength", "erection_strength", "too_thick", "erection_too_thick", "strength_under_loads")
 OF_STIFFNESS = (
     "falls_under_loads", "imperfect", "falls_after_years", "reserve_under_loads", "falls", "reserve", "needs_bracing",
@@ -64,7 +66,7 @@ Runs = Callable[[Case, Form | None], Form]
 class Candidate:
     """A design."""
 
-    section: Section
+    section: Section | GivenSection
     bracing: str
     spacing: float
 
@@ -83,7 +85,7 @@ class Tried:
 
     @property
     def linear(self) -> float:
-        return min(self.known.linear.values())
+        return min(*self.known.linear.values(), MOST)
 
 
 @dataclass(eq=False)
@@ -109,7 +111,10 @@ class Search:
     last: Form | None = None
 
     def __post_init__(self) -> None:
-        self.base, self.sections, self.start = self._prepared()
+        self.base, self.material, self.sections, self.start = self._prepared()
+        self.first = max(
+            (k for k, each in enumerate(self.sections) if each.depth <= self.start.section.depth), default=0
+        )
         loads = self.base.built_loads()
         assert loads is not None
         self.loads, self.reserve = loads, loads.stability.reserve
@@ -151,6 +156,7 @@ class Search:
             self._keep(tried, guess)
             self.hope[bracing] = spacing * (guess * LIKELY / self.reserve) ** (1 / GAIN)
             if tried.known.bare < 1:
+                self.hope[bracing] = 0.0
                 self._say(tried, "estimate", tried.known.bare, "falls under its own weight before it is braced")
                 return None
             if guess * LIKELY < self.reserve:
@@ -167,15 +173,15 @@ class Search:
             if used > 1:
                 self._say(tried, "path", factor, f"uses {percent(used)} of its strength under the loads", used)
                 self.deepest = tried.candidate.section.depth / used
-                continue
+                continue  # with a thinner one
             form = tried.form.finished(self.progress)
             codes = {finding.code: finding for finding in form.verdict.findings if finding.level != "good"}
             named = ", ".join(codes)
             if too_thick := [codes[code] for code in OF_SIZE if code in codes]:
                 worst = max((each.figure or inf) / (each.limit or 1.0) for each in too_thick)
                 self._say(tried, "checks", factor, f"is too thick for its bends ({named})", worst)
-                self.deepest = tried.candidate.section.depth / worst
-                continue
+                self.deepest = tried.candidate.section.depth / max(worst, 1.01)
+                continue  # with a thinner one
             if any(code in codes for code in OF_STIFFNESS):
                 self._say(tried, "checks", factor, f"does not pass all checks ({named})", used)
                 return None
@@ -186,24 +192,27 @@ class Search:
 
     def _thickest(self, spacing: float, bracing: str) -> Tried | None:
         """The thickest section that the bends allow; None: none, or the shell was not found."""
-        most = min(CLOSE * spacing, self.deepest)
+        most = min(CLOSE * spacing if "section" in self.asked.design.open else inf, self.deepest)
         allowed = [k for k, section in enumerate(self.sections) if section.depth <= most * (1 + 1e-9)]
-        if "section" not in self.asked.design.open:
-            allowed = [0]
-        tried, k = dict[int, Tried | None](), min(self._first, max(allowed, default=0))
+        tried, k = dict[int, Tried | None](), min(self.first, max(allowed, default=0))
         while allowed and k not in tried:
-            tried[k] = self._tried(Candidate(self.sections[k], bracing, spacing))
-            if (found := tried[k]) is None:
+            tried[k] = found = self._tried(Candidate(self.sections[k], bracing, spacing))
+            if found is None:
                 break
-            depth = self.sections[k].depth / (found.used or 1.0)
-            k = max((j for j in allowed if self.sections[j].depth <= depth * (1 + 1e-9)), default=allowed[0])
+            depth = NEAR * self.sections[k].depth / (found.used or 1.0)
+            broken = min(
+                (j for j, each in tried.items() if each is not None and each.used > 1), default=len(self.sections)
+            )
+            thin = [j for j in allowed if j < broken and self.sections[j].depth <= depth]
+            k = max(thin, default=allowed[0])
         fitting = [k for k, found in tried.items() if found is not None and found.used <= 1]
         if not fitting:
-            if any(tried.values()):
-                self._say(next(filter(None, tried.values())), "estimate", None, "is too thick for its sharpest bend")
+            for found in filter(None, tried.values()):
+                self._keep(found, 0.0)
+                self._say(found, "estimate", None, "is too thick for its sharpest bend")
             return None
-        self._first = max(fitting)
-        return tried[self._first]
+        self.first = max(fitting)
+        return tried[self.first]
 
     def _tried(self, candidate: Candidate) -> Tried | None:
         """A design popped up and braced, and the estimate of what it carries."""
@@ -240,7 +249,7 @@ class Search:
         if checks.stopped:
             raise OutOfTimeError(checks.stopped)
         shell = next(iter(checks.shells[name].values()))
-        return least_carried(shell)[0], shell.utilisation or 0.0, shell.bracing_utilisation or 0.0
+        return min(least_carried(shell)[0], MOST), shell.utilisation or 0.0, shell.bracing_utilisation or 0.0
 
     def _keep(self, tried: Tried, factor: float) -> None:
         if factor > self.best_factor or (self.best is not None and tried.candidate == self.best.candidate):
@@ -254,7 +263,7 @@ class Search:
     ) -> None:
         """Keep a step and announce it."""
         step = DesignStep(
-            section=size_text(tried.section), bracing=tried.bracing, spacing=tried.spacing, known_by=known_by,
+            section=_name(tried.section), bracing=tried.bracing, spacing=tried.spacing, known_by=known_by,
             factor=factor, used=used, said=said,
         )  # fmt: skip
         self.steps.append(step)
@@ -262,26 +271,33 @@ class Search:
         self.announce(f"design: {step.words}: {said}{share}")
 
     def _limits(self) -> str:
-        """What stands in the way of the best design: its strength and the size that would carry the loads."""
+        """What stands in the way of the best design: what its strength allows, and the size that would carry the
+        loads."""
         best = self.best
         if best is None:
-            return "the thinnest is too thick for the sharpest bend"
-        kind, share = best.candidate.bracing, self.best_factor / best.linear
-        thicker = [section for section in self.sections if section.depth > best.candidate.section.depth]
-        for section in thicker:
-            found = self._tried(replace(best.candidate, section=section))
-            if found is None:
+            return self.steps[-1].said if self.steps else "nothing was tried"
+        keys = {"section": "rod.section", "bracing": "bracing", "spacing": "layout.spacing"}
+        given = [keys[part] for part in keys if part not in self.asked.design.open]
+        also = f", or leave {' and '.join(given)} open" if given else ""
+        size = _name(best.candidate.section)
+        if best.used > 1:
+            return f"strength: {_place(best)} is too sharp for {size}: {_flatter(best)}{also}"
+        share = self.best_factor / best.linear
+        for section in self.sections:
+            if section.depth <= best.candidate.section.depth:
+                continue
+            if (found := self._tried(replace(best.candidate, section=section))) is None:
                 break
-            if share * found.linear >= self.reserve:
-                x, y = found.known.place
-                radius = found.known.radius
-                also = {"none": ", or brace it"}.get(kind, "")
-                return (
-                    f"strength: the radius of {rounded(radius)} m at {x:.3g}, {y:.3g} m allows "
-                    f"{size_text(best.candidate.section)}, stability asks for {size_text(section)}: make it flatter "
-                    f"than {rounded(radius * found.used)} m there{also}"
-                )
-        return f"stability: no size that is sold carries {rounded(self.reserve)} times the loads"
+            if share * found.linear < self.reserve:
+                continue
+            asked_for = f"stability asks for {_name(section)}"
+            if found.used > 1:
+                return f"strength: {_place(found)} allows {size}, {asked_for}: {_flatter(found)}{also}"
+            if section.depth > self.deepest:
+                return f"strength while it is erected allows {size}, {asked_for}: erect it in another way{also}"
+            return f"room for joints, a tenth of the spacing, allows {size}, {asked_for}{also}"
+        most = rounded_down(self.best_factor)
+        return f"stability: {size} carries {most} of the {rounded(self.reserve)} times that are asked for{also}"
 
     def _made(self, form: Form, limits: str) -> Form:
         """The form of the design, as one of the case that was asked for."""
@@ -305,32 +321,42 @@ class Search:
             case = replace(case, bracing=bracing_of(candidate))
         return case
 
-    def _prepared(self) -> tuple[Case, tuple[Section, ...], Candidate]:
-        """The case with what the search decides at once; the sections to choose from; where to begin."""
+    def _prepared(self) -> tuple[Case, Material | None, tuple[Section | GivenSection, ...], Candidate]:
+        """The case with what the search decides at once; the material and the sections to choose from; where to
+        begin."""
         asked = self.asked
         _require(asked)
         case = replace(asked, design=DesignTable())
         if case.pop_up.ends == BOTH and not case.supports and case.pop_up.held is None:
-            case = replace(case, pop_up=replace(case.pop_up, ends=PINNED.name))
+            case = replace(case, pop_up=replace(case.pop_up, ends="pinned"))
         built = case.build(progress=self.progress)
-        rod, spacing = built.rod, built.layout.least_spacing
-        self.material = rod.material
-        if case.strength.creep is None and rod.material is not None and rod.material.name in CREEP:
-            creep = CREEP[rod.material.name]
-            case = replace(case, strength=replace(case.strength, creep=creep))
-            self.announce(f"creep of {rod.material.name} taken as {creep:g}: ask its maker (strength.creep)")
-        sections: tuple[Section, ...] = (rod.section,)
-        self._first = 0
+        rod, name = built.rod, built.rod.material.name if built.rod.material else None
+        if case.strength.creep is None and name in CREEP:
+            case = replace(case, strength=replace(case.strength, creep=CREEP[name]))
+            self.announce(f"creep of {name} taken as {CREEP[name]:g}: ask its maker (strength.creep)")
+        sections: tuple[Section | GivenSection, ...] = (rod.section,)
         if "section" in asked.design.open:
-            assert rod.material is not None
-            sections = TRADE_SIZES.get(rod.material.name or "rubber", ())  # type: ignore[call-overload]
+            sections = TRADE_SIZES[name] if name else ()
             if not sections:
                 raise InputError(
                     "design.open has the section, and no sizes of this material are known: give rod.material.preset, "
                     "or rod.section"
                 )
-            self._first = max((k for k, each in enumerate(sections) if each.depth <= rod.section.depth), default=0)
-        return case, sections, Candidate(rod.section, "none", spacing)
+        return case, rod.material, sections, Candidate(rod.section, "none", built.layout.least_spacing)
+
+
+def _name(section: Section | GivenSection) -> str:
+    return "the given section" if isinstance(section, GivenSection) else size_text(section)
+
+
+def _place(tried: Tried) -> str:
+    """Where the rods use most of their strength."""
+    x, y = tried.known.place
+    return f"the radius of {rounded(tried.known.radius)} m at {x:.3g}, {y:.3g} m"
+
+
+def _flatter(tried: Tried) -> str:
+    return f"make it flatter than {rounded(tried.known.radius * tried.used)} m there"
 
 
 def bracing_of(candidate: Candidate) -> BracingKinds:

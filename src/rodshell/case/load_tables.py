@@ -54,7 +54,7 @@ def usual_loads(snow: str | None = None, wind: str | None = None, *, size: float
         combinations.append({"name": "winter", "factors": {"own": OWN, "snow": ACTING}})
     if wind is not None:
         tilt, bend = 0.5 * (LEE - PRESSED) / size, (0.5 * (LEE + PRESSED) - CROWN) / size**2
-        along = f"{CROWN:g} - {-tilt:.6g}*x + {bend:.6g}*x^2"
+        along = f"{CROWN:g} - {-tilt:.9g}*x + {bend:.9g}*x^2"
         loads.append({"name": "wind", "kind": "wind", "value": wind, "coefficient": along, "directions": DIRECTIONS})
         combinations.append({"name": "storm", "factors": {"own": LIFTING, "wind": ACTING}})
     return {"loads": loads, "combinations": combinations}
