@@ -410,6 +410,7 @@ class Form:
         results = checked_results(
             results, mesh, checks, self.fabrication,
             limits=self.options.limits(self.rod, asked), net=net_factors(mesh, self.rod.section, asked.hole),
+            positions={ends: popped.positions for ends, popped in self.popped.items()},
         )  # fmt: skip
         if self.loaded is not None:
             results = loaded_results(results, self.footprint.mesh, self.loaded)

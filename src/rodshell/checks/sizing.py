@@ -192,6 +192,23 @@ class Fit:
         )  # thinner ones strain in proportion or less
         return _of_depth(like, rounded_down(most), wall_stays=shape is not None)
 
+    def stiffer(self, rod: Rod, gain: float, strength: float) -> Section | None:
+        """The thinnest size that is sold of which a shell carries `gain` times as many of its own weights as of `rod`,
+        and that withstands the bends, or else the thickest that withstands them; None: none is stiffer and does.
+
+        By similarity: the same bends take EI, so that the factor on the weight grows with EI over it.
+        """
+        assert rod.material is not None
+        now, best = np.array(rod.section.second_moments) / rod.section.area, None  # type: ignore[union-attr]
+        for section in TRADE_SIZES.get(rod.material.name or "rubber", ()):
+            grown = np.min(np.array(section.second_moments) / section.area / now)
+            used = self._strain(section, rod.material) * rod.material.youngs_modulus / strength
+            if grown > 1 and used <= 1 and section.depth <= self.thickest:
+                best = section
+                if grown >= gain:
+                    break
+        return best
+
     def reason(
         self,
         section: Section,
@@ -219,6 +236,8 @@ class Fit:
 
         stock = _sold(material, shape)
         share = _share(self._strain(section, material) / bears)
+        if self._strain(section, material) > AIM * bears and section in stock[1:]:
+            share += ", as its own weight asks for"
         said = (
             f"by {self.bends_from}, aiming at {_share(AIM)} of the permanent strength at most and coming to {share}; "
         )

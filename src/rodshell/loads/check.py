@@ -16,7 +16,7 @@ from pydantic import Field
 
 from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.checks.bending import require_known_stress
-from rodshell.checks.self_weight import self_weight, shown_limit
+from rodshell.checks.self_weight import linear_factor, self_weight, shown_limit
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.figures import loads as figures
 from rodshell.figures.checks import SelfWeight
@@ -27,7 +27,7 @@ from rodshell.formfinding import PopUp, Stages
 from rodshell.layout import GridMesh
 from rodshell.loads.bracing import stressed
 from rodshell.loads.combinations import Loads
-from rodshell.loads.kinds import GRAVITY, Forces, Settlement, Temperature
+from rodshell.loads.kinds import Forces, Settlement, Temperature
 from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
 from rodshell.loads.nodes import LoadedNodes
@@ -200,9 +200,6 @@ def estimate(stages: Stages, loads: Loads, *, limits: Limits = Limits()) -> Esti
     structure, areas = _locked(popped, ends, loads, stages), tributary_of(stages)
     nodes = LoadedNodes(popped.positions, structure.mass, areas, stages.layout.least_spacing)
     acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
-    erected = Structure.erected(popped, stages.rod)
-    weight = np.zeros((erected.size, 3))
-    weight[: len(erected.mass), 2] = -GRAVITY * erected.mass
     state, forces = structure.equilibrium.state, structure.equilibrium.forces[: len(structure.mesh.edges)]
     bent = bending_under(structure.shell, state, structure.rod, forces, limits)
     used = utilisation(
@@ -211,8 +208,9 @@ def estimate(stages: Stages, loads: Loads, *, limits: Limits = Limits()) -> Esti
     )  # fmt: skip
     by, entry = used.governs or (None, largest_at(bent.curvature))
     x, y, _ = structure.shell.positions(state)[structure.mesh.rod_nodes[entry]].tolist()
+    linear = {name: _linear(structure, load) for name, load in acting.items()}
     return Estimate(
-        {name: _linear(structure, load) for name, load in acting.items()}, _linear(erected, Load(forces=weight)),
+        linear, linear_factor(popped.shell, popped.equilibrium),
         None if by is None else used.largest[by], (x, y), 1.0 / float(bent.curvature[entry]),
     )  # fmt: skip
 
