@@ -41,7 +41,7 @@ LEFT = {
     "laths both ways": 0.7,
 }  # share of the linear factor that imperfections leave, at first:
 # .28 to .49 of cables and .55 to .89 of laths on domes of 6 and 12 m
-NEAR = 1.1  # strains are in proportion to the depth, but for those by the prestress of cables
+NEAR = 1.1  # strains are in proportion to the depth, except those by the prestress of cables
 GAIN = 1.5  # exponent of the spacing's inverse by which factors grow at most: .9 to 1.3 were measured
 LIKELY = 1.15  # a path is followed if the reserve may be reached by so much more than is estimated
 PRESTRAIN, ROPE, THIN_ROPE, THIN = (
@@ -120,7 +120,7 @@ class Search:
         self.loads, self.reserve = loads, loads.stability.reserve
 
     def form(self) -> Form:
-        """The first design that stands, or the one that comes nearest, with what stands in the way."""
+        """The first design that stands, or the one that comes nearest, with what limits it."""
         limits = ""
         try:
             for spacing, bracing in self._grids():
@@ -271,7 +271,7 @@ class Search:
         self.announce(f"design: {step.words}: {said}{share}")
 
     def _limits(self) -> str:
-        """What stands in the way of the best design: what its strength allows, and the size that would carry the
+        """What limits the best design: what its strength allows, and the size that would carry the
         loads."""
         best = self.best
         if best is None:

@@ -172,15 +172,18 @@ class Run:
         if stages.status != "converged" or not standing or strength is None:
             return rod, fit, stages
         enough = ENOUGH * RESERVE * (1.0 + (limits.creep or 0.0))
-        carried = min(linear_factor(shell.shell, shell.equilibrium) for shell in standing)
-        if carried >= enough:
+        factor = min(linear_factor(shell.shell, shell.equilibrium) for shell in standing)
+        if factor >= enough:
             return rod, fit, stages
         known = fit.by_pop_ups(list(stages.popped.values()), rod, shear_weight=limits.shear_weight)
-        if (section := known.stiffer(rod, enough / carried, strength)) is None:
+        if (section := known.stiffer(rod, enough / factor, strength)) is None:
             return rod, fit, stages
         thicker = Rod(section, rod.material)
-        found = stages_of(thicker)
-        return (thicker, known, found) if found.status == "converged" else (rod, fit, stages)
+        try:
+            found = stages_of(thicker)
+        except OutOfTimeError:  # what was found before is kept
+            return rod, fit, stages
+        return (thicker, replace(known, by_weight=True), found) if found.status == "converged" else (rod, fit, stages)
 
     def _sized_before(self) -> Rod | None:
         """The rod of the earlier form, if its section was chosen by pop-ups and nothing that decided it has changed."""

@@ -82,6 +82,7 @@ class Fit:
         thickest_of: what that depth is a share of, in words.
         bends_from: where the bends are taken from, in words.
         shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
+        by_weight: whether the shell's own weight asked for more than three quarters of the strength.
     """
 
     width: float
@@ -91,6 +92,7 @@ class Fit:
     thickest_of: str = "a hundredth of half the shell's width"
     bends_from: str = "an estimate of the bends"
     shear_weight: float = VON_MISES
+    by_weight: bool = False
 
     @classmethod
     def on(
@@ -236,8 +238,7 @@ class Fit:
 
         stock = _sold(material, shape)
         share = _share(self._strain(section, material) / bears)
-        if self._strain(section, material) > AIM * bears and section in stock[1:]:
-            share += ", as its own weight asks for"
+        share += ", as its own weight asks for" * self.by_weight
         said = (
             f"by {self.bends_from}, aiming at {_share(AIM)} of the permanent strength at most and coming to {share}; "
         )

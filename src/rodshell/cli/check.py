@@ -16,7 +16,9 @@ from rodshell.units import shown
 @click.option("--loads", metavar="FILE", help="File with [[loads]] and [[combinations]], in place of the case's own.")
 @usual_loads_options
 @output_options("Folder for the results; default DIR, or out/CASE.")
-def command(source: str, loads: str | None, output: RunOptions, snow: str | None, wind: str | None, own: bool) -> int:
+def command(
+    source: str, loads: str | None, output: RunOptions, snow: str | None, wind: str | None, own_weight: bool
+) -> int:
     """Check a shell under loads: deflections, reactions, stability and utilisation under each combination.
 
     DIR is an earlier result, whose case is run again. CASE is a case file or the name of a built-in case. The loads are
@@ -29,7 +31,7 @@ def command(source: str, loads: str | None, output: RunOptions, snow: str | None
             f"{source} has no case.toml that could be run again: give a result of rodshell form, or a case"
         )
     given: dict[str, object] = {} if loads is None else {"loads": loads}
-    case = under_usual_loads(str(path / "case.toml") if path.is_dir() else source, given, snow, wind, own)
+    case = under_usual_loads(str(path / "case.toml") if path.is_dir() else source, given, snow, wind, own_weight)
     if case.of_table:
         raise InputError(f"{shown(source)} comes from a table of rods: without a target no areas for loads are known")
     if case.built_loads() is None:

@@ -161,27 +161,27 @@ _WIND = "Velocity pressure of the wind, from four sides: with the own weight and
 LOADS = (
     click.option("--snow", metavar="LOAD", help=_SNOW),
     click.option("--wind", metavar="LOAD", help=_WIND),
-    click.option("--own", is_flag=True, help="1.35 times the own weight; --snow and --wind have it too."),
+    click.option("--own", "own_weight", is_flag=True, help="1.35 times the own weight; --snow and --wind have it too."),
 )
 """Options of the usual loads, which stand in place of a case's own."""
 
 
 def usual_loads_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options of `LOADS`, as `snow`, `wind` and `own`."""
+    """Give a command the options of `LOADS`, as `snow`, `wind` and `own_weight`."""
     for option in reversed(LOADS):
         command = option(command)
     return command
 
 
 def under_usual_loads(
-    name: str, overrides: Mapping[str, object], snow: str | None, wind: str | None, own: bool
+    name: str, overrides: Mapping[str, object], snow: str | None, wind: str | None, own_weight: bool
 ) -> Case:
     """A case with the usual loads of these options in place of its own; with its own where none is given.
 
     Raises:
         InputError: a file of loads is given too.
     """
-    if snow is None and wind is None and not own:
+    if snow is None and wind is None and not own_weight:
         return load_case(name, overrides)
     if "loads" in overrides:
         raise InputError("--loads FILE has loads of its own: leave it out, or --snow, --wind and --own")

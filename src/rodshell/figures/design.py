@@ -1,4 +1,4 @@
-"""Records of a design to load: what was tried, and what is chosen or stands in the way."""
+"""Records of a design to load: what was tried, and what is chosen, or what limits."""
 
 from typing import Literal
 
@@ -34,6 +34,6 @@ class Design(Record):
 
     open: Rows[Text] = rows("what was chosen")
     found: Flag = Field(description="whether it carries its loads with their reserve and within its strength")
-    limits: Text = Field(default="", description="what stands in the way where none does")
+    limits: Text = Field(default="", description="what limits them where none does")
     steps: Rows[DesignStep] = rows("what was tried, in this order")
     assumed_creep: Number = key("growth of deflections that was taken, as none is known of these rods")

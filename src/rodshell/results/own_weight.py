@@ -196,8 +196,8 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, t
 
 
 def _too_sharp(results: Results, rod: RodType, sold: Sequence[Section], factors: Mapping[Ends, float]) -> str:
-    """Where the surface is too sharp for the thinnest size that would carry the weight, and how flat it would do; "":
-    none would, or it is not known where."""
+    """Where the surface is too sharp for the thinnest size that would carry the weight, and how flat it has to be; "":
+    none does, or it is not known where."""
     ends, factor = min(factors.items(), key=lambda pair: pair[1])
     bent = bent_of(results, ends)
     for section in sold:

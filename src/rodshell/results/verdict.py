@@ -479,7 +479,7 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
 
 
 def _not_designed(results: Results) -> Iterator[Said]:
-    """That nothing that was left open carries the loads, and what stands in the way."""
+    """That nothing that was left open carries the loads, and what limits."""
     if (design := results.design) is not None and not design.found:
         yield said("no_design", count=len(design.steps), limits=design.limits)
 
