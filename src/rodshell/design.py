@@ -33,7 +33,7 @@ from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Sectio
 from rodshell.rods.supports import BOTH
 from rodshell.schema import read
 
-SPACINGS = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35, 0.3)  # of the spacing that is taken where none is given
+SPACINGS = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35, 0.3, 0.25)  # of the spacing that is taken where none is given
 LEFT = {
     "none": 1.0,
     "cables": 0.42,
@@ -108,6 +108,8 @@ class Search:
     deepest: float = inf
     best: Tried | None = None
     best_factor: float = -1.0
+    guessed: Tried | None = None
+    guess: float = -1.0
     last: Form | None = None
 
     def __post_init__(self) -> None:
@@ -126,14 +128,16 @@ class Search:
             for spacing, bracing in self._grids():
                 if (found := self._stands(spacing, bracing)) is not None:
                     return self._made(found, "")
+            self._follow_guess()
             limits = self._limits()
         except OutOfTimeError as late:
+            self.best = self.best or self.guessed
             if self.best is None:
                 raise
             limits = str(late)
         if self.best is None:
             raise InputError(f"no design could be popped up: {self.steps[-1].said if self.steps else limits}")
-        self.announce(f"design: no size that is sold stands: {limits}")
+        self.announce(f"design: none that stands was found: {limits}")
         return self._made(self.best.form.finished(self.progress), limits)
 
     def _grids(self) -> Iterator[tuple[float, str]]:
@@ -141,7 +145,7 @@ class Search:
         spacings: Iterable[float] = (self.start.spacing,)
         if "spacing" in self.asked.design.open:
             spacings = (float(f"{share * self.start.spacing:.2g}") for share in SPACINGS)
-        bracings = tuple(LEFT) if "bracing" in self.asked.design.open else ("given",)
+        bracings = tuple(LEFT) if "bracing" in self.asked.design.open else (self.asked.bracing.kind,)
         *_, closest = spacings = tuple(spacings)
         for spacing in spacings:
             yield from ((spacing, bracing) for bracing in bracings if spacing <= self.hope.get(bracing, inf))
@@ -151,21 +155,23 @@ class Search:
     def _stands(self, spacing: float, bracing: str) -> Form | None:
         """The design of this spacing and bracing with all checks, if it stands."""
         while (tried := self._thickest(spacing, bracing)) is not None:
-            share = self.left.get(bracing, 1.0)
-            guess = share * tried.linear
-            self._keep(tried, guess)
-            self.hope[bracing] = spacing * (guess * LIKELY / self.reserve) ** (1 / GAIN)
-            if tried.known.bare < 1:
-                self.hope[bracing] = 0.0
-                self._say(tried, "estimate", tried.known.bare, "falls under its own weight before it is braced")
+            bare, guess = tried.known.bare, self.left[bracing] * tried.linear
+            if bare < 1:
+                closer = spacing * (bare * LIKELY) ** (1 / GAIN)
+                self.hope |= {kind: min(closer, self.hope.get(kind, inf)) for kind in LEFT}
+                self._keep(tried, 0.0)
+                self._say(tried, "estimate", bare, "falls under its own weight before it is braced")
                 return None
+            if guess > self.guess:
+                self.guessed, self.guess = tried, guess
+            self._hope(spacing, bracing, guess)
             if guess * LIKELY < self.reserve:
                 self._say(tried, "estimate", guess, f"may carry {rounded_down(guess)} times the loads")
                 return None
             factor, used, braced = self._followed(tried)
             self.left[bracing] = factor / tried.linear
             self._keep(tried, factor)
-            self.hope[bracing] = spacing * (factor * LIKELY / self.reserve) ** (1 / GAIN)
+            self._hope(spacing, bracing, factor)
             if factor < self.reserve or braced > 1:
                 weak = f", and its bracing uses {percent(braced)} of its strength" if braced > 1 else ""
                 self._say(tried, "path", factor, f"carries {rounded_down(factor)} times the loads{weak}", used)
@@ -189,6 +195,10 @@ class Search:
             self._say(tried, "checks", factor, f"{left}, {rounded_down(factor)} times the loads", used)
             return form
         return None
+
+    def _hope(self, spacing: float, bracing: str, factor: float) -> None:
+        """Up to which spacing this bracing may reach the reserve, by the factor at another."""
+        self.hope[bracing] = spacing * (factor * LIKELY / self.reserve) ** (1 / GAIN)
 
     def _thickest(self, spacing: float, bracing: str) -> Tried | None:
         """The thickest section that the bends allow; None: none, or the shell was not found."""
@@ -252,8 +262,16 @@ class Search:
         return min(least_carried(shell)[0], MOST), shell.utilisation or 0.0, shell.bracing_utilisation or 0.0
 
     def _keep(self, tried: Tried, factor: float) -> None:
-        if factor > self.best_factor or (self.best is not None and tried.candidate == self.best.candidate):
+        """Keep the design that carries most, as far as it is followed."""
+        if factor > self.best_factor:
             self.best, self.best_factor = tried, factor
+
+    def _follow_guess(self) -> None:
+        """Follow the design of which most is guessed, where that is more than any that was followed carries."""
+        if self.guessed is not None and self.guess > self.best_factor:
+            factor, used, _ = self._followed(self.guessed)
+            self._say(self.guessed, "path", factor, f"carries {rounded_down(factor)} times the loads", used)
+            self._keep(self.guessed, factor)
 
     def _say(self, tried: Tried, known_by: KnownBy, factor: float | None, said: str, used: float | None = None) -> None:
         self._add(tried.candidate, known_by, said, factor, tried.known.used if used is None else used)

@@ -132,7 +132,7 @@ def test_snow_leaves_what_is_given_and_chooses_the_rest(folder: Path, capsys: py
     result = json.loads(capsys.readouterr().out)
     assert result["design"]["open"] == ["section"]
     assert {step["spacing"] for step in result["design"]["steps"]} == {0.3}
-    assert {step["bracing"] for step in result["design"]["steps"]} == {"given"}
+    assert {step["bracing"] for step in result["design"]["steps"]} == {"laths"}
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ class DesignStep(Record):
     @property
     def words(self) -> str:
         """Section, bracing and spacing."""
-        braced = {"none": "without bracing", "given": "with its bracing"}.get(self.bracing, f"with {self.bracing}")
+        braced = "without bracing" if self.bracing == "none" else f"with {self.bracing}"
         return f"{self.section}, {braced}, rods {round(1e3 * (self.spacing or 0.0))} mm apart"
 
 

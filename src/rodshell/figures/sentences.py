@@ -74,7 +74,7 @@ SENTENCES = {
         "its final shape from flat is not known"
     ),
     "needs_bracing": "{alone}the shell {carries} {weight} without its bracing: support it until that is in place",
-    "no_design": "of {count} designs that were tried none carries the loads with its reserve; {limits}",
+    "no_design": "no design was found that carries the loads with its reserve ({count} tried); {limits}",
     "no_imperfections": (
         "imperfections were left out, and the factors on the loads are those of the perfect shell: have them "
         "looked at ({offer})"
