@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-drawn accept-lattices accept-signed attack ci-full house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed attack ci-full house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -52,6 +52,9 @@ accept-verdict: ## print the table of invalid inputs and verdicts (some minutes)
 accept-loads: ## print the table of loads and stability
 	python -m tests.acceptance.loads
 
+accept-designed: ## print the table of roofs that are designed to their loads (an hour)
+	python -m tests.acceptance.designed
+
 accept-refine: ## print the table of refinement
 	python -m tests.acceptance.refine
 
@@ -80,7 +83,7 @@ accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1
 ci-full:   ## what .ci/run does, and every acceptance table (hours; DESIGNS=1000 for a shorter sweep)
 	.ci/run
 	$(MAKE) --keep-going test-indices accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
-		accept-house accept-loads accept-refine accept-sweep accept-studio accept-drawn accept-lattices accept-signed attack
+		accept-house accept-loads accept-refine accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed attack
 
 house:     ## print the source by room, before and after: statements, lines, public names, files; circles, long files
 	python -m tests.acceptance.house_figures

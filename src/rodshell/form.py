@@ -16,6 +16,7 @@ from rodshell.checks import Checks, check
 from rodshell.errors import ConvergenceError, InputError
 from rodshell.fabrication.fabricate import Fabricated, fabricate
 from rodshell.fabrication.settings import has_slots
+from rodshell.figures.design import Design
 from rodshell.figures.form import FlatState
 from rodshell.figures.records import Ends
 from rodshell.formfinding import Agreement, Boundary, Draped, Footprint, PopUp, Stages, Trimmed
@@ -66,6 +67,7 @@ class Form:
         search: the search for anchor and heading, where the case asked for one.
         refined: the form before and after its refinement, where the case asked for one.
         reused: the stages that were taken over from an earlier form, see `Job.run`.
+        design: how its loads decided what the case leaves open, where it asked for that.
     """
 
     case: Case
@@ -76,6 +78,7 @@ class Form:
     search: Search | None = None
     refined: Refined | None = None
     reused: tuple[str, ...] = ()
+    design: Design | None = None
 
     # What was asked for
 
@@ -296,6 +299,7 @@ class Form:
     def results(self) -> Results:
         """The typed content of result.json before anything was checked."""
         found = results_of(self.stages).changed(flat_state=self.flat_state)
+        found = found if self.design is None else found.changed(design=self.design)
         return found if self.refined is None else with_refinement(found, self.refined)
 
     def unchecked(self) -> Archive:
@@ -406,6 +410,7 @@ class Form:
         results = checked_results(
             results, mesh, checks, self.fabrication,
             limits=self.options.limits(self.rod, asked), net=net_factors(mesh, self.rod.section, asked.hole),
+            positions={ends: popped.positions for ends, popped in self.popped.items()},
         )  # fmt: skip
         if self.loaded is not None:
             results = loaded_results(results, self.footprint.mesh, self.loaded)

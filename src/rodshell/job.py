@@ -17,6 +17,7 @@ from rodshell.case import Case, load_case
 from rodshell.case.from_objects import case_of, case_of_rod_ends
 from rodshell.case.load import changed_case, flattened, is_described, require_keys_of_rods
 from rodshell.case.rod_ends import RodEnds, read_result, read_table
+from rodshell.design import designed
 from rodshell.errors import InputError, OutOfMemoryError
 from rodshell.figures.records import Ends
 from rodshell.form import Form
@@ -261,21 +262,21 @@ class Job:
             time_limit = positive("time_limit", time_limit, "s", infinite=True)
         if announce is not None:
             function_of("announce", announce, "a function of a sentence, such as print", "")
-        run = Run(
-            self._case,
-            self._target,
-            inputs_of(self._case) if self._inputs is None else self._inputs,
-            warm_start,
-            limited(progress, time_limit),
-            announce,
-            file_path("frames_in", frames_in),
-            pops_up=until != "drape",
-        )
+        inputs = inputs_of(self._case) if self._inputs is None else self._inputs
+        place, in_time = file_path("frames_in", frames_in), limited(progress, time_limit)
+
+        def run_of(case: Case, earlier: Form | None, announce: Announce | None = None) -> Run:
+            return Run(case, self._target, inputs, earlier, in_time, announce, place, pops_up=until != "drape")
+
         entered = progress if isinstance(progress, AbstractContextManager) else nullcontext()
         try:
             with entered:
+                if self._case.design.open and until != "drape":
+                    say = announce or (lambda sentence: None)
+                    return designed(self._case, lambda case, earlier: run_of(case, earlier).form(), in_time, say)
+                run = run_of(self._case, warm_start, announce)
                 form = run.table_form() if self._case.of_table else run.form()
-                return form.finished(run.progress) if until == "fabrication" else form
+                return form.finished(in_time) if until == "fabrication" else form
         except MemoryError as error:
             raise error if isinstance(error, OutOfMemoryError) else OutOfMemoryError(error) from None
 

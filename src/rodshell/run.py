@@ -10,6 +10,7 @@ from rodshell.case import Case
 from rodshell.case.case import Built
 from rodshell.case.held import built
 from rodshell.case.rod_ends import RodEnds
+from rodshell.checks.self_weight import linear_factor
 from rodshell.checks.sizing import Fit, doubt_of_unit, require_likely_sizes
 from rodshell.errors import OutOfTimeError
 from rodshell.form import Form
@@ -22,6 +23,7 @@ from rodshell.refining.acceptance import Refined, refined
 from rodshell.refining.variables import Family
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
+from rodshell.results.own_weight import ENOUGH, RESERVE
 from rodshell.results.summary import chosen, rod_text
 from rodshell.rods.section import GivenSection, Rod, size_text
 from rodshell.rods.supports import PINNED
@@ -93,9 +95,11 @@ class Run:
         if fit and case.joint.resists_shear and case.ends and self.pops_up and self._sizes(rod):
             rod, fit, stages = self._sized(rod, fit, partial(self._stages, case, tried))
             case.require_strength(rod)
-        self._announce_rod(rod, fit)
         if stages is None or found.method != tried.method:
             stages = self._stages(case, found, rod)
+        if fit and case.ends and self.pops_up and self._sizes(rod):
+            rod, fit, stages = self._carrying(rod, fit, stages, partial(self._stages, case, found))
+        self._announce_rod(rod, fit)
         case = case.with_rod(rod)
         same = self._unchanged(case)
         return self._made(case, stages, searched, same, self._refined(case, stages, same))
@@ -156,6 +160,30 @@ class Run:
                 break
             rod, stages = following, found
         return rod, fit, stages
+
+    def _carrying(
+        self, rod: Rod, fit: Fit, stages: Stages, stages_of: Callable[[Rod], Stages]
+    ) -> tuple[Rod, Fit, Stages]:
+        """The same, of a thicker rod where the chosen one does not carry its own weight with the reserve that is asked
+        for, and the whole strength allows one that does."""
+        limits = self.options.limits(rod, self.asked.strength)
+        strength = self.asked.permanent_strength(rod.material) if rod.material else None
+        standing = [shell for shell in stages.popped.values() if shell.report.stable]
+        if stages.status != "converged" or not standing or strength is None:
+            return rod, fit, stages
+        enough = ENOUGH * RESERVE * (1.0 + (limits.creep or 0.0))
+        factor = min(linear_factor(shell.shell, shell.equilibrium) for shell in standing)
+        if factor >= enough:
+            return rod, fit, stages
+        known = fit.by_pop_ups(list(stages.popped.values()), rod, shear_weight=limits.shear_weight)
+        if (section := known.stiffer(rod, enough / factor, strength)) is None:
+            return rod, fit, stages
+        thicker = Rod(section, rod.material)
+        try:
+            found = stages_of(thicker)
+        except OutOfTimeError:  # what was found before is kept
+            return rod, fit, stages
+        return (thicker, replace(known, by_weight=True), found) if found.status == "converged" else (rod, fit, stages)
 
     def _sized_before(self) -> Rod | None:
         """The rod of the earlier form, if its section was chosen by pop-ups and nothing that decided it has changed."""

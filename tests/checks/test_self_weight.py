@@ -106,7 +106,7 @@ def test_a_roof_of_thin_laths_is_said_first_not_to_stand():
     assert {weighed.limit for weighed in results.self_weight.values()} == {"limit point"}
     assert results.verdict.reasons[0].startswith(
         "the shell does not stand under its own weight: it carries only 11 % of it with pinned ends and 23 % of it "
-        "with clamped ends; its section was chosen without regard to its weight, and no size that is sold is likely to "
+        "with clamped ends; its section was chosen to withstand its bends, and no size that is sold is likely to "
         "carry it and to withstand its bends; made of rods about 3.5 times as thick, it would carry 2.7 times its own "
         "weight with clamped ends, by an estimate, but they would use 119 % of larch's permanent design strength by "
         "EN 1995-1-1"

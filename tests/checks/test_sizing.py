@@ -555,3 +555,49 @@ def test_sizes_that_suit_each_other_are_taken_at_every_scale(scale: float, slend
     rod = rs.Rod(rs.Circle(scale / slender), rs.Material.preset("gfrp"))
     target = rs.Hemisphere(scale)
     rs.Job(target, rs.GridLayout.orthogonal(spacing=scale / 5), rod).case.build(target)
+
+
+def weighed(form: rs.Form, ends: str) -> float:
+    """Times its own weight that the shell carries; above 100: infinite."""
+    return form.checks.self_weight[ends].load_factor or np.inf
+
+
+@pytest.mark.slow
+def test_a_chosen_section_carries_its_weight_with_its_reserve_where_the_whole_strength_allows_it() -> None:
+    """The next thinner size, which three quarters of the strength allow, does not."""
+    wide = {"target.kind": "paraboloid", "target.radius": 12.0, "target.height": 8.0, "checks.stages": 2}
+    said: list[str] = []
+    form = rs.Job.load(wide).run(announce=said.append)
+    assert min(weighed(form, ends) for ends in form.ends) >= 1.5
+    assert any("as its own weight asks for" in line for line in said)
+    sizes = TRADE_SIZES["gfrp"]
+    thinner = sizes[sizes.index(form.rod.section) - 1]
+    section = {f"rod.section.{key}": value for key, value in vars(thinner).items()} | {"rod.section.kind": thinner.kind}
+    other = rs.Job.load({**wide, **section, "rod.material.preset": "gfrp"}).run()
+    assert min(weighed(other, ends) for ends in other.ends) < 1.5 * 1.05
+    used = {name: form.archive().results.bending.shapes()[name].utilisation for name in form.ends}  # type: ignore[union-attr]
+    assert 0.75 < max(value or 0.0 for value in used.values()) <= 1
+
+
+@pytest.mark.slow
+def test_where_no_size_carries_its_weight_the_place_that_is_too_sharp_is_named() -> None:
+    """The radius of the shell that was found is that of the place, whose x and y are on one of its rods."""
+    spruce = {"target.kind": "paraboloid", "target.radius": 6.0, "target.height": 3.0, "rod.material.preset": "spruce"}
+    form = rs.Job.load({**spruce, "pop_up.ends": "pinned", "checks.stages": 2}).run()
+    reason = form.verdict.reasons[0]
+    named = re.search(
+        r"its weight asks for (\S+ x \S+ mm), and the radius of (\S+) m at (\S+), (\S+) m is too sharp for it: make it "
+        r"flatter than (\S+) m there",
+        reason,
+    )
+    assert named is not None, reason
+    bent, mesh = form.checks.bending["pinned"], form.footprint.mesh
+    assert float(named[2]) == pytest.approx(1 / bent.curvature.max(), rel=0.01)
+    at = form.popped["pinned"].positions[mesh.rod_nodes[int(np.argmax(bent.stress))]]
+    assert (float(named[3]), float(named[4])) == pytest.approx(at[:2], abs=0.01)
+    size = next(each for each in TRADE_SIZES["spruce"] if size_text(each) == named[1])
+    used = form.archive().results.bending.shapes()["pinned"].utilisation  # type: ignore[union-attr]
+    assert isinstance(size, rs.RectangularSection)
+    assert isinstance(form.rod.section, rs.RectangularSection)
+    sharper = max(size.width / form.rod.section.width, size.height / form.rod.section.height)
+    assert float(named[5]) / float(named[2]) == pytest.approx((used or 0.0) * sharper, rel=0.02)

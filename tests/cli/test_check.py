@@ -105,6 +105,37 @@ def test_a_case_and_then_its_result_are_checked_under_loads(folder: Path) -> Non
 
 
 @pytest.mark.slow
+def test_an_earlier_result_is_checked_under_the_usual_loads(folder: Path) -> None:
+    assert main(["form", "roof.toml", "--only", "csv", "-q", "--pop_up.ends", "pinned"]) == 0
+    assert main(["check", "out/roof", "--snow", "0.01 kN/m2", "--wind", "0.01 kN/m2", "--only", "csv", "-q"]) == 0
+    result = read("out/roof").results
+    names = {name.partition(",")[0] for name in result.loads}
+    assert names == {"permanent", "winter", "storm"}
+    assert len(result.loads) == 6
+    assert result.design is None  # what was formed is checked as it is
+
+
+@pytest.mark.slow
+def test_snow_leaves_what_is_given_and_chooses_the_rest(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small = [
+        "--target.radius",
+        "3 m",
+        "--target.height",
+        "1.2 m",
+        "--layout.edge",
+        "auto",
+        "--rod.section.kind",
+        "auto",
+    ]
+    given = ["--bracing.kind", "laths", "--layout.spacing", "300 mm", "--checks.strength", "240 MPa"]
+    assert main(["form", "roof.toml", "--snow", "0.5 kN/m2", *small, *given, "--only", "csv", "--json", "-q"]) in (0, 4)
+    result = json.loads(capsys.readouterr().out)
+    assert result["design"]["open"] == ["section"]
+    assert {step["spacing"] for step in result["design"]["steps"]} == {0.3}
+    assert {step["bracing"] for step in result["design"]["steps"]} == {"laths"}
+
+
+@pytest.mark.slow
 def test_a_form_checks_its_loads_and_keeps_them_in_its_case(folder: Path) -> None:
     job = rs.Job.load("roof.toml", loads="light.toml", pop_up__ends="pinned")
     form = job.run()
@@ -121,7 +152,9 @@ def test_a_form_checks_its_loads_and_keeps_them_in_its_case(folder: Path) -> Non
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["roof.toml"], "has no loads: give --loads FILE"),
+        (["roof.toml"], 'has no loads: give --snow "0.5 kN/m2", --wind "0.5 kN/m2" or --own, --loads FILE'),
+        (["roof.toml", "--own", "--loads", "light.toml"], "--loads FILE has loads of its own"),
+        (["roof.toml", "--snow", "5 parrots"], "parrots"),
         (["."], "has no case.toml"),
         (["roof.toml", "--loads", "none.toml"], "there is no such file"),
         (["roof.toml", "--loads", "roof.toml"], 'has "target", which no file of loads has'),

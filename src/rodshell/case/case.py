@@ -11,6 +11,7 @@ from rodshell.case.held import Held, built
 from rodshell.case.load_tables import BracingKinds, CombinationRows, LoadRows, NoBracing
 from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import (
+    DesignTable,
     DrapeTable,
     LayoutKinds,
     LayoutTable,
@@ -83,6 +84,7 @@ class Case:
     locked_joints: LockedJoints | None = None
     stability: Stability = field(default_factory=Stability)
     strength: Strength = field(default_factory=Strength)
+    design: DesignTable = field(default_factory=DesignTable)
 
     @property
     def held_objects(self) -> dict[str, Held]:
@@ -106,6 +108,7 @@ class Case:
                 )
             notes += [f"# {held.note}\n"] if held.note else []
         idle = {"bracing"} if self.bracing.kind == "none" else set[str]()
+        idle |= set() if self.design.open else {"design"}
         if not self.loads:
             unset = {"stability": Stability(), "strength": Strength()}
             idle |= {name for name, table in unset.items() if getattr(self, name) == table}
@@ -175,6 +178,17 @@ class Case:
         from rodshell.checks.sizing import Fit
 
         return Fit.on(target, layout, anchor=anchor, joint=self.joint, progress=progress)
+
+    @property
+    def left_open(self) -> tuple[str, ...]:
+        """What loads may decide (`design.open`): section, bracing and spacing, as far as they are not given."""
+        spaced = isinstance(self.layout, LayoutTable) and self.layout.spacing == "auto" and not self.seams.lines
+        left = {
+            "section": self.rod.held is None and "section" in self.rod.left_open,
+            "bracing": self.bracing.kind == "none",
+            "spacing": spaced,
+        }
+        return tuple(name for name, is_open in left.items() if is_open)
 
     def with_rod(self, rod: Rod) -> "Case":
         """The same case with this rod spelled out."""

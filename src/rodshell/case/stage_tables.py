@@ -195,6 +195,18 @@ class RefineTable:
         return tuple(taper if name == "taper" else KNOWN[name] for name in self.vary)
 
 
+OPEN = ("section", "bracing", "spacing")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignTable:
+    """What is chosen so that the shell carries the loads of the case with their reserve."""
+
+    open: Annotated[
+        Annotated[tuple[str, ...], words(OPEN)], f"what the loads decide: {', '.join(OPEN)}"
+    ] = ()  # fmt: skip
+
+
 @dataclass(frozen=True, kw_only=True)
 class NamedPatch:
     name: Annotated[str, "name of the patch: A, B, ... from left to right"]

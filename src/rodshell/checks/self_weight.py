@@ -16,6 +16,7 @@ from rodshell.formfinding.methods import STANDARD_GRAVITY
 from rodshell.model import Shell
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load_path import Limit, load_path
+from rodshell.solve.modes import linear_buckling
 
 MOST = 100.0  # times its own weight: a shell that carries more is not loaded further
 SNOW, MOST_SNOW = 1e3, 10.0  # [Pa]; times that
@@ -54,6 +55,14 @@ def self_weight(
         factorizations=end.factorizations,
     )  # fmt: skip
     return found_weight, whole
+
+
+def linear_factor(shell: Shell, found: Equilibrium, *, most: float = MOST) -> float:
+    """Times its own weight at which a shell buckles linearly, from its stable equilibrium without loads; infinite:
+    above `most`."""
+    weight = np.zeros_like(found.state)
+    weight[: len(shell.mass), 2] = -STANDARD_GRAVITY * shell.mass[:, 2]
+    return float(np.min(linear_buckling(found, weight, 1, most=most).factors, initial=np.inf))
 
 
 def snow_carried(under_weight: Equilibrium, plan: Floats, progress: Callable[[int, float], None]) -> float | None:

@@ -82,6 +82,7 @@ class Fit:
         thickest_of: what that depth is a share of, in words.
         bends_from: where the bends are taken from, in words.
         shear_weight: strength over shear strength, by which torsion is added to bending, see `checks.bending`.
+        by_weight: whether the shell's own weight asked for more than three quarters of the strength.
     """
 
     width: float
@@ -91,6 +92,7 @@ class Fit:
     thickest_of: str = "a hundredth of half the shell's width"
     bends_from: str = "an estimate of the bends"
     shear_weight: float = VON_MISES
+    by_weight: bool = False
 
     @classmethod
     def on(
@@ -192,6 +194,23 @@ class Fit:
         )  # thinner ones strain in proportion or less
         return _of_depth(like, rounded_down(most), wall_stays=shape is not None)
 
+    def stiffer(self, rod: Rod, gain: float, strength: float) -> Section | None:
+        """The thinnest size that is sold of which a shell carries `gain` times as many of its own weights as of `rod`,
+        and that withstands the bends, or else the thickest that withstands them; None: none is stiffer and does.
+
+        By similarity: the same bends take EI, so that the factor on the weight grows with EI over it.
+        """
+        assert rod.material is not None
+        now, best = np.array(rod.section.second_moments) / rod.section.area, None  # type: ignore[union-attr]
+        for section in TRADE_SIZES.get(rod.material.name or "rubber", ()):
+            grown = np.min(np.array(section.second_moments) / section.area / now)
+            used = self._strain(section, rod.material) * rod.material.youngs_modulus / strength
+            if grown > 1 and used <= 1 and section.depth <= self.thickest:
+                best = section
+                if grown >= gain:
+                    break
+        return best
+
     def reason(
         self,
         section: Section,
@@ -219,6 +238,7 @@ class Fit:
 
         stock = _sold(material, shape)
         share = _share(self._strain(section, material) / bears)
+        share += ", as its own weight asks for" * self.by_weight
         said = (
             f"by {self.bends_from}, aiming at {_share(AIM)} of the permanent strength at most and coming to {share}; "
         )

@@ -9,8 +9,10 @@ from typing import Any
 
 import click
 
-from rodshell.case import CaseKey, case_keys, load_case
+from rodshell.case import Case, CaseKey, case_keys, load_case
+from rodshell.case.held import built
 from rodshell.case.keys import BY_KIND, keys_of_kinds
+from rodshell.case.load_tables import usual_loads
 from rodshell.errors import InputError
 from rodshell.quantities import Duration
 from rodshell.schema import value_of, written
@@ -152,6 +154,41 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
         return found
 
     return decorate
+
+
+_SNOW = 'Snow on the plan, such as "0.5 kN/m2": with 1.35 times the own weight and 1.5 times the snow.'
+_WIND = "Velocity pressure of the wind, from four sides: with the own weight and 1.5 times the wind."
+LOADS = (
+    click.option("--snow", metavar="LOAD", help=_SNOW),
+    click.option("--wind", metavar="LOAD", help=_WIND),
+    click.option("--own", "own_weight", is_flag=True, help="1.35 times the own weight; --snow and --wind have it too."),
+)
+"""Options of the usual loads, which stand in place of a case's own."""
+
+
+def usual_loads_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of `LOADS`, as `snow`, `wind` and `own_weight`."""
+    for option in reversed(LOADS):
+        command = option(command)
+    return command
+
+
+def under_usual_loads(
+    name: str, overrides: Mapping[str, object], snow: str | None, wind: str | None, own_weight: bool
+) -> Case:
+    """A case with the usual loads of these options in place of its own; with its own where none is given.
+
+    Raises:
+        InputError: a file of loads is given too.
+    """
+    if snow is None and wind is None and not own_weight:
+        return load_case(name, overrides)
+    if "loads" in overrides:
+        raise InputError("--loads FILE has loads of its own: leave it out, or --snow, --wind and --own")
+    size = 0.0
+    if wind is not None:
+        size = built(load_case(name, overrides).target).size
+    return load_case(name, {**overrides, **usual_loads(snow, wind, size=size)})
 
 
 def wanted_kinds(only: str | None) -> list[str] | None:

@@ -38,6 +38,7 @@ class WorstBent(Bent):
 
     rod: Text | None = key("id of the rod with the largest stress")
     at: Number = key("distance of that place from the rod's start", "m")
+    where: Point | None = key("that place in space; absent in stages of the deployment", "m")
     share: Number = key("share of the deployment at which it occurs; 0 flat, 1 popped up")
 
 

@@ -9,10 +9,12 @@ from rodshell.figures.sentences import SENTENCES
 
 CODES = {
     "assumed_class": "strengths are those of a service class that was taken, as none was given",
+    "assumed_creep": "creep of the rods was taken, as none was given",
     "cables_short": "cables are shortened by so little that they have to be stressed to their forces",
     "contact": "rods touch or cross",
     "creep_unknown": "creep is not known of these rods",
     "deflection": "the shell moves by more than was allowed under a combination of loads",
+    "designed": "loads decided section, bracing or spacing",
     "ends_in_the_air": "rod ends lie above the lowest: what holds them has to be designed",
     "erection_contact": "rods touch or cross on the way that was computed",
     "erection_strength": "rods use more than their strength on the way that was computed",
@@ -30,6 +32,7 @@ CODES = {
     "lost": "the deployment could not be followed all the way",
     "low_stiffness": "with the modulus that a code asks for, the shell falls under a combination of loads",
     "needs_bracing": "without its bracing the shell does not carry its own weight",
+    "no_design": "of what was left open nothing carries the loads",
     "no_imperfections": "imperfections were left out",
     "no_loads": "loads other than the own weight and even snow were not checked",
     "no_mass": "no mass was given",
@@ -72,8 +75,8 @@ CODES = {
 Level = Literal["good", "check", "unbuildable", "unknown"]
 RANKS: tuple[Level, ...] = ("good", "check", "unbuildable", "unknown")  # each graver than those before
 GOOD = frozenset({
-    "assumed_class", "cables_short", "in_place", "lies_flat", "no_imperfections", "no_loads",
-    "not_nested", "relaxed", "stands", "stands_under_loads",
+    "assumed_class", "assumed_creep", "cables_short", "designed", "in_place", "lies_flat", "no_imperfections",
+    "no_loads", "not_nested", "relaxed", "stands", "stands_under_loads",
 })  # fmt: skip
 FAULTS = frozenset({
     "contact", "falls", "falls_after_years", "falls_under_loads", "flat", "imperfect", "slip", "strength",

@@ -11,6 +11,10 @@ SENTENCES = {
         "strengths and creep are those of service class 2 (covered), which was taken as none was given: give "
         "strength.service_class (1 inside, 3 in the weather)"
     ),
+    "assumed_creep": (
+        "by creep, which was not given, deflections under permanent loads were taken to grow by {creep} of what they "
+        "are at first: ask the rods' maker (strength.creep)"
+    ),
     "cables_short": (
         "cables are shortened by only {short}: one that is {scatter} too long {slack}, one {scatter} too short has up "
         "to {times} times its force; stress them to their forces (bracing.csv), not to their lengths"
@@ -24,6 +28,7 @@ SENTENCES = {
         "under {place} with {ends} ends the shell moves by up to {moved}{years}, and {allowed} are allowed "
         "(combinations.deflection)"
     ),
+    "designed": "{what} chosen to carry the loads: {design}; {count} designs were tried (design in result.json)",
     "ends_in_the_air": (
         "{count} of {all} rod ends lie up to {high} above the lowest: where they do not stand on the ground, an edge "
         "beam, an arch or a ring has to hold them{against}; it was taken as {stiff} here and has to be designed"
@@ -69,6 +74,7 @@ SENTENCES = {
         "its final shape from flat is not known"
     ),
     "needs_bracing": "{alone}the shell {carries} {weight} without its bracing: support it until that is in place",
+    "no_design": "no design was found that carries the loads with its reserve ({count} tried); {limits}",
     "no_imperfections": (
         "imperfections were left out, and the factors on the loads are those of the perfect shell: have them "
         "looked at ({offer})"

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from rodshell.arrays import Floats, Ints, largest_at
 from rodshell.checks.bending import require_known_stress
-from rodshell.checks.self_weight import self_weight, shown_limit
+from rodshell.checks.self_weight import linear_factor, self_weight, shown_limit
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.figures import loads as figures
 from rodshell.figures.checks import SelfWeight
@@ -33,14 +33,14 @@ from rodshell.loads.laths import laid
 from rodshell.loads.locked_joints import locked
 from rodshell.loads.nodes import LoadedNodes
 from rodshell.loads.settings import Cables, Laths, part_of_span
-from rodshell.loads.stability import after_years, capacity
+from rodshell.loads.stability import MOST, after_years, capacity
 from rodshell.loads.strength import By, Limits, Utilisation, area_of, bending_under, preset_limits, utilisation
 from rodshell.loads.structure import NO_PAIRS, Structure
 from rodshell.progress import Progress, silent
 from rodshell.rods.design_strength import Duration
 from rodshell.solve.equilibrium import Equilibrium
 from rodshell.solve.load import Load
-from rodshell.solve.modes import softest_motion
+from rodshell.solve.modes import linear_buckling, softest_motion
 from rodshell.targets.tributary import Tributary, tributary_areas
 from rodshell.units import shown
 
@@ -172,6 +172,55 @@ def check_shells(
     except OutOfTimeError as late:
         stopped = str(late)
     return LoadChecks(loads, found, braced, limits, stopped, tuple(missing) if stopped else (), self_weight=weighed)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is known of a shell after a few factorisations, before any path is followed.
+
+    Args:
+        linear: by combination, the linear buckling factor of the shell with its bracing; infinite: above `MOST`.
+        bare: the same of its own weight, without its bracing.
+        used: of the permanent strength by the erected shell with its bracing, at most; None: no strength is known.
+        place: x, y where that is [m].
+        radius: of the rod there [m].
+    """
+
+    linear: Mapping[str, float]
+    bare: float
+    used: float | None
+    place: tuple[float, float]
+    radius: float
+
+
+def estimate(stages: Stages, loads: Loads, *, limits: Limits = Limits()) -> Estimate:
+    """The first of the shells of a form before its loads are checked.
+
+    Raises:
+        InputError: as of `check_shells`.
+    """
+    ends, popped = next(iter(stages.popped.items()))
+    structure, areas = _locked(popped, ends, loads, stages), tributary_of(stages)
+    nodes = LoadedNodes(popped.positions, structure.mass, areas, stages.layout.least_spacing)
+    acting = {name: _load(structure, nodes, loads, factors) for name, factors in loads.combinations.items()}
+    state, forces = structure.equilibrium.state, structure.equilibrium.forces[: len(structure.mesh.edges)]
+    bent = bending_under(structure.shell, state, structure.rod, forces, limits)
+    used = utilisation(
+        structure.shell, state, structure.rod, forces=forces, limits=limits, asked=loads.strength, duration=None,
+        bent=bent,
+    )  # fmt: skip
+    by, entry = used.governs or (None, largest_at(bent.curvature))
+    x, y, _ = structure.shell.positions(state)[structure.mesh.rod_nodes[entry]].tolist()
+    linear = {name: _linear(structure, load) for name, load in acting.items()}
+    return Estimate(
+        linear, linear_factor(popped.shell, popped.equilibrium),
+        None if by is None else used.largest[by], (x, y), 1.0 / float(bent.curvature[entry]),
+    )  # fmt: skip
+
+
+def _linear(structure: Structure, load: Load) -> float:
+    """The lowest linear buckling factor; infinite: above `MOST`."""
+    return float(np.min(linear_buckling(structure.equilibrium, load, 1, most=MOST).factors, initial=np.inf))
 
 
 def unchecked(loads: Loads, *, refused: str = "", stopped: str = "") -> LoadChecks:

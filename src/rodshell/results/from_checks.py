@@ -43,6 +43,7 @@ def checked_results(
     *,
     limits: Limits = Limits(),
     net: Floats | None = None,
+    positions: Mapping[Ends, Floats] = {},
 ) -> Results:
     """The results of a form with all that was checked and made: more of each rod, and tables of the checks.
 
@@ -50,12 +51,13 @@ def checked_results(
         mesh: of the flat grid, its rods in the order of the results.
         limits: design strengths of the rods, by which utilisation is counted where they are known.
         net: (k,) stress of the net section over that of the full one, at each entry of `rod_nodes`; None: all is full.
+        positions: (n, 3) of the mesh's nodes in each final shape [m].
     """
     material = results.rod.material if results.rod else None
     anisotropic = material is not None and material.shear is not None  # as timber is
     torsion = checks.shear_unknown(limits.counted) if anisotropic and limits.shear_strength is None else ()
     withstood = _Withstood(limits, mesh, np.ones(len(mesh.rod_nodes)) if net is None else net)
-    bending = _bending(checks, withstood)
+    bending = _bending(checks, withstood, positions)
     joint = (results.joint.mass if results.joint else None) or 0.0
     way, known = bending.deployment, limits.erection is not None
     erected = way.utilisation if way and known else None
@@ -141,10 +143,12 @@ class _Withstood:
             self.known[id(bent)] = self.net * (bent.curvature if stress is None else stress)
         return self.known[id(bent)]
 
-    def worst_place(self, bent: BendingCheck) -> dict[str, Any]:
-        """The most stressed place: the rod, and how far along it [m]."""
+    def worst_place(self, bent: BendingCheck, positions: Floats | None = None) -> dict[str, Any]:
+        """The most stressed place: the rod, how far along it [m], and by the positions (n, 3) of the mesh's nodes where
+        that is [m]."""
         at = largest_at(self.stressed(bent))
-        return dict(zip(("rod", "at"), self.mesh.place(at), strict=True))
+        placed = dict[str, Any](zip(("rod", "at"), self.mesh.place(at), strict=True))
+        return placed if positions is None else placed | {"where": tuple(positions[self.mesh.rod_nodes[at]].tolist())}
 
     def worst(self, final: Sequence[BendingCheck], stages: Sequence[BendingCheck], where: slice) -> dict[str, Any]:
         """Worst figures over a part of the rods' nodes, in any of the shapes."""
@@ -187,10 +191,11 @@ def _rods(
     return tuple(found)
 
 
-def _bending(checks: Checks, withstood: _Withstood) -> Bending:
+def _bending(checks: Checks, withstood: _Withstood, positions: Mapping[Ends, Floats]) -> Bending:
     everywhere, shapes = slice(None), dict[str, Any]()
     for ends, bent in checks.bending.items():
-        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **withstood.worst_place(bent))
+        placed = withstood.worst_place(bent, positions.get(ends))
+        shapes[ends] = WorstBent(**withstood.worst([bent], (), everywhere), **placed)
     if checks.deployment is not None:
         stages = list(zip(checks.deployment.share.tolist(), checks.deployment_bending, strict=True))
         stage = int(np.argmax([bent.curvature.max() for bent in checks.deployment_bending]))

@@ -14,6 +14,7 @@ from pydantic import FailFast, Field, ValidationError
 
 from rodshell.errors import InputError, OutputError
 from rodshell.figures import checks, form
+from rodshell.figures.design import Design
 from rodshell.figures.fabrication import Brace, Fabrication
 from rodshell.figures.findings import Finding, Level
 from rodshell.figures.loads import DesignStrength, LoadCases, LoadedShell
@@ -144,6 +145,7 @@ class Results(Record, metaclass=_Refusing):
     )
     strength: DesignStrength | None = key("design strengths, by which the rods are judged")
     loads: LoadCases = Field(default_factory=dict, description="the shell under loads, by combination and ends")
+    design: Design | None = key("how loads decided section, bracing and spacing; absent where that was not asked for")
     deployment: checks.Deployment | None = key("the shell from flat to popped up")
     contact: checks.Contact | None = key("contact of rods with each other")
     other_shapes: ByEnds[checks.OtherShapes] = by_ends("other stable shapes on the same supports")

@@ -82,6 +82,7 @@ def verdict(results: Results) -> Verdict:
     there = [ends for ends in shells if status_of(shells[ends]) == CONVERGED and shells[ends].stable is not False]
     weight, stands = weight_findings(results, usable or there)
     lead = weight if there and not stands else []
+    lead = [*_not_designed(results), *lead]
     gravest = [*lead, *far, *grave] if off > FAR_OFF else [*lead, *grave, *far]
     to_check = [
         *gravest, *weight, *sinking(results, usable), *load_points(results, usable or there),
@@ -176,10 +177,22 @@ def _merits(results: Results, usable: list[Ends]) -> Iterator[Said]:
         yield said("stands_under_loads", None, least, 1, place=name, factor=carries, what=what, stiffness=words)
 
 
+def _not_designed(results: Results) -> Iterator[Said]:
+    """That nothing that was left open carries the loads, and what limits."""
+    if (design := results.design) is not None and not design.found:
+        yield said("no_design", count=len(design.steps), limits=design.limits)
+
+
 def _assumed(results: Results) -> Iterator[Said]:
-    """What was taken where nothing was given: a service class; that imperfections were left out; what strengths count
-    on; and how cables are to be stressed."""
-    strength = results.strength
+    """What was taken or chosen where nothing was given: a design by its loads; creep; a service class; that
+    imperfections were left out; what strengths count on; and how cables are to be stressed."""
+    strength, design = results.strength, results.design
+    if design is not None and design.found:
+        *before, last = design.open
+        what = f"{', '.join(before)} and {last} were" if before else f"{last} was"
+        yield said("designed", what=what, design=design.steps[-1].words, count=len(design.steps))
+    if design is not None and design.assumed_creep is not None:
+        yield said("assumed_creep", None, design.assumed_creep, creep=percent(design.assumed_creep))
     if any(found.imperfect_kind is None for _, _, found in results.loaded_shells()):
         offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
         yield said("no_imperfections", offers=(offer,), offer=offer)

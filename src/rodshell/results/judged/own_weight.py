@@ -161,7 +161,7 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, t
     rod, kind = results.rod, (results.joint.kind if results.joint else None) or "ball"
     factors = {ends: factor for ends, factor in factors.items() if factor > 0}
     chosen = rod is not None and "section" in (rod.chosen or {})
-    why = "; its section was chosen without regard to its weight" * chosen
+    why = "; its section was chosen to withstand its bends" * chosen
     if not factors or rod is None or kind not in WITHOUT_STIFFNESS or is_braced(results):
         return why, ()
     sold = () if results.refinement else sizes_sold(rod)  # a refined rod's section varies along it
@@ -178,6 +178,7 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, t
                 return words + "".join(f" ({offer})" for offer in offers), offers
     if chosen and sold:
         why += ", and no size that is sold is likely to carry it and to withstand its bends"
+        why += _too_sharp(results, rod, sold, factors)
     ends, factor = max(factors.items(), key=lambda pair: pair[1])
     thicker = sqrt(enough / factor)
     made = (
@@ -188,6 +189,23 @@ def _other_rods(results: Results, factors: Mapping[Ends, float]) -> tuple[str, t
         words = "support it, or take another material; rodshell check finds what bracing adds"
         return f"{made}, but they would {too_much}: {words}", ()
     return made + _share(results, ends, thicker), ()
+
+
+def _too_sharp(results: Results, rod: RodType, sold: Sequence[Section], factors: Mapping[Ends, float]) -> str:
+    """Where the surface is too sharp for the thinnest size that would carry the weight, and how flat it has to be; "":
+    none does, or it is not known where."""
+    ends, factor = min(factors.items(), key=lambda pair: pair[1])
+    bent = bent_of(results, ends)
+    for section in sold:
+        used = _sharper(rod, section) * (bent.utilisation or 0.0)
+        if factor * _gain(rod, section) >= ENOUGH * reserve(results) and used > 1 and bent.where and bent.min_radius:
+            x, y, _ = bent.where
+            return (
+                f": its weight asks for {size_text(section)}, and the radius of {rounded(bent.min_radius)} m at "
+                f"{rounded(x or 0.0)}, {rounded(y or 0.0)} m is too sharp for it: make it flatter than "
+                f"{rounded(used * bent.min_radius)} m there"
+            )
+    return ""
 
 
 def _again(results: Results, section: Section) -> tuple[str, ...]:
