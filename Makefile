@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-drawn accept-lattices accept-signed attack ci-full house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-drawn accept-lattices accept-signed accept-hosts attack ci-full house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -67,6 +67,9 @@ accept-lattices: ## print the table of lattices along curves of the target
 accept-signed: ## print the table of what an engineer signs
 	python -m tests.acceptance.signed
 
+accept-hosts: ## print the table of shells replayed in OpenSees (some minutes; needs `pip install -e ".[opensees]"`)
+	python -m tests.acceptance.hosts
+
 attack:    ## hostile input of every kind, a hundred times as many tries as in the tests (an hour)
 	RODSHELL_ATTACK=$(or $(TRIES),100) python -m pytest -n 2 -m attack tests
 	python -m tests.acceptance.verdict harm
@@ -80,7 +83,7 @@ accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1
 ci-full:   ## what .ci/run does, and every acceptance table (hours; DESIGNS=1000 for a shorter sweep)
 	.ci/run
 	$(MAKE) --keep-going test-indices accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
-		accept-house accept-loads accept-refine accept-sweep accept-studio accept-drawn accept-lattices accept-signed attack
+		accept-house accept-loads accept-refine accept-sweep accept-studio accept-drawn accept-lattices accept-signed accept-hosts attack
 
 house:     ## print the source by room, before and after: statements, lines, public names, files; circles, long files
 	python -m tests.acceptance.house_figures
