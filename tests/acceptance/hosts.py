@@ -58,6 +58,7 @@ GRID = """
 spacing = "1.6 m"
 edge = "0.2 m"
 """
+WIDE = GRID.replace("1.6", "3.2").replace("0.2", "0.1")  # 32 edges a span: spans between cables buckle by themselves
 PINNED = """
 [pop_up]
 ends = "pinned"
@@ -88,7 +89,7 @@ SHELLS = {
     "round tubes": CAP + GRID + TUBE + PINNED,
     "laths with pins": PARABOLOID + GRID + LATH + PINS + PINNED,
     "two layers": CAP + GRID + TUBE + PINS + 'eccentricity = "41.7 mm"\n' + PINNED,
-    "braced": CAP + GRID + TUBE + PINNED + CABLES + SNOW,
+    "braced": CAP + WIDE + TUBE + PINNED + CABLES + SNOW,
     "under snow": CAP + GRID + TUBE + PINNED + SNOW,
 }
 

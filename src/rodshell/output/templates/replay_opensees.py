@@ -237,8 +237,8 @@ class Replay:
     def limit(self, forces):
         """The factor of some forces up to which the deployed shell is stable; the shell is unloaded again.
 
-        The lowest eigenvalue falls with the factor: each step goes part of the way to where it would be 0, so that the shell
-        stays on its path and the limit is approached from below.
+        The lowest eigenvalue falls with the factor: each step goes part of the way to where it would be 0, so that the
+        shell stays on its path and the limit is approached from below.
         """
         self._solver()
         self._pattern(LOADS, "Linear")
