@@ -2,8 +2,8 @@
 
 Rhino files are in millimetres, all others in metres. In VTK two rods share no points, so that a joint can have the
 stress of both; arrays are binary (base64, packed). COMPAS JSON is plain JSON, so that COMPAS need not be installed:
-`compas.json_load("popped_clamped.json")` gives {"rods": [Polyline, ...], "grid": Graph, "cells": Mesh}. glTF 2.0 is binary,
-y up: each rod is swept along its final shape and coloured by the gap to the target.
+`compas.json_load("popped_clamped.json")` gives {"rods": [Polyline, ...], "grid": Graph, "cells": Mesh}. glTF 2.0 is
+binary, y up: each rod is swept along its final shape and coloured by the gap to the target.
 """
 
 import base64
