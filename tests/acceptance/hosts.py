@@ -9,7 +9,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -153,6 +153,15 @@ def rows_of(name: str, python: str) -> Iterator[Row]:
     for what, factor in found["limits"].items():
         assert limit
         yield Row(name, f"limit factor off, {what}", off(factor, limit), LIMIT, "", f"{factor:.4g}")
+
+
+def markdown(rows: Iterable[Row]) -> str:
+    """Rows as a table: what OpenSees finds, and how far it is off."""
+    lines = [
+        f"| {row.case} | {row.what} | {100 * row.measured:.2g} % | {100 * row.bound:.2g} % | {row.note} |"
+        for row in rows
+    ]
+    return "| shell | | off | allowed | in OpenSees |\n|---|---|---|---|---|\n" + "\n".join(lines)
 
 
 def off(theirs: float, ours: float) -> float:
