@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed attack ci-full house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed accept-hosts attack release-checks ci-full house paper pictures bench bench-quick bench-rods
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -70,6 +70,9 @@ accept-lattices: ## print the table of lattices along curves of the target
 accept-signed: ## print the table of what an engineer signs
 	python -m tests.acceptance.signed
 
+accept-hosts: ## print the table of shells replayed in OpenSees (some minutes; needs `pip install -e ".[opensees]"`)
+	python -m tests.acceptance.hosts
+
 attack:    ## hostile input of every kind, a hundred times as many tries as in the tests (an hour)
 	RODSHELL_ATTACK=$(or $(TRIES),100) python -m pytest -n 2 -m attack tests
 	python -m tests.acceptance.verdict harm
@@ -80,10 +83,16 @@ accept-house: ## print the table of kept results, archives of all formats, misus
 accept-sweep: ## print the table of sweeps and searches (an hour; with DESIGNS=1000 ten minutes)
 	python -m tests.acceptance.sweep --designs $(or $(DESIGNS),10000)
 
-ci-full:   ## what .ci/run does, and every acceptance table (hours; DESIGNS=1000 for a shorter sweep)
+release-checks: ## licences of all dependencies, the workflow, the container file, the citation, the client's wheel
+	.ci/release
+
+ci-full:   ## what .ci/run does, every Python, what a release needs, and every acceptance table (hours; DESIGNS=1000: fewer)
 	.ci/run
+	.ci/versions
+	.ci/release
 	$(MAKE) --keep-going test-indices accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
-		accept-house accept-loads accept-refine accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed attack
+		accept-house accept-loads accept-refine accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed \
+		accept-hosts attack
 
 house:     ## print the source by room, before and after: statements, lines, public names, files; circles, long files
 	python -m tests.acceptance.house_figures

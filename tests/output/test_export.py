@@ -98,7 +98,7 @@ def test_bad_requests_are_one_sentence(
 
 def test_kinds_are_read_in_any_case_and_checked() -> None:
     assert wanted_kinds(" DXF,csv ") == ["dxf", "csv"]
-    assert set(DEFAULT) == set(KINDS) - {"3dm"}
+    assert set(DEFAULT) == set(KINDS) - {"3dm", "opensees"}
     with pytest.raises(InputError, match="report"):
         wanted_kinds("html")
 

@@ -20,6 +20,7 @@ KINDS = {
     "dxf": "drawings/plan.dxf", "svg": "drawings/plan.svg", "pdf": "drawings/drawings.pdf", "csv": "schedule/rods.csv",
     "obj": "model/*.obj", "gltf": "model/*.glb", "vtp": "model/*.vtp",
     "compas": "model/*.json", "png": "pictures/*.png", "report": "report.html", "3dm": "model/*.3dm",
+    "opensees": "opensees/*.json",
 }  # fmt: skip
 
 

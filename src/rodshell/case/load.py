@@ -58,7 +58,7 @@ BUILT_IN: dict[str, _Raw] = {
 The pavilion is a shell to stand under: 12 m wide, of GFRP tubes that stay below their permanent design strength.
 """
 
-BY_SUFFIX = dict.fromkeys((".obj", ".stl", ".ply", ".off", ".glb", ".gltf"), "mesh")
+BY_SUFFIX = dict.fromkeys((".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".json"), "mesh")
 BY_SUFFIX |= dict.fromkeys((".3dm", ".step", ".stp"), "nurbs")
 BY_SUFFIX |= dict.fromkeys((".csv", ".png", ".pgm", ".jpg", ".jpeg", ".tif", ".tiff"), "heights")
 """Kinds of targets by the file that holds them: the file alone is a case."""

@@ -23,7 +23,7 @@ SCHEMA = "Print the JSON Schema of result.json and exit."
 
 @click.command()
 @click.argument("folder", metavar="DIR")
-@click.option("--only", metavar="KINDS", help="Kinds of files, such as dxf,csv; default: all but 3dm.")
+@click.option("--only", metavar="KINDS", help="Kinds of files, such as dxf,csv; default: all but 3dm and opensees.")
 @click.option("--out", "-o", metavar="DIR", help="Folder to write to; default: the result itself.")
 @click.option("--schema", is_flag=True, is_eager=True, expose_value=False, callback=_print_schema, help=SCHEMA)
 @FORCE
@@ -31,7 +31,8 @@ SCHEMA = "Print the JSON Schema of result.json and exit."
 def command(folder: str, only: str | None, out: str | None, force: bool, quiet: bool) -> int:
     """Write drawings, schedules, models or the report again, from the result in DIR.
 
-    KINDS are dxf, svg, pdf, csv, obj, gltf, vtp, compas, png, report, and 3dm, which needs the package rhino3dm.
+    KINDS are dxf, svg, pdf, csv, obj, gltf, vtp, compas, png, report, 3dm, which needs the package rhino3dm, and
+    opensees, a model for finite-element programs with a script that replays it from flat.
     """
     from rodshell.output.files import export
     from rodshell.results import read

@@ -47,5 +47,7 @@ class Fabrication(Record):
     kerf: Number = key("length lost at each saw cut", "m")
     total_mass: Number = key("mass of rods and joints", "kg")
     bracing: Rows[Brace] = rows("diagonals of the cells, those of a cell in a row")
+    cable_stiffness: Number = key("EA of each cable; null: no cables, or no loads were checked", "N")
+    cable_mass_per_length: Number = key("the same of its mass", "kg/m")
     stock: Stock | None = key("the cutting plan; absent where rods are cut from boards, curved at rest")
     slot_depth: Number = key("depth of the slots by which upright strips cross; absent where there are none", "m")

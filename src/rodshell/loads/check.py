@@ -66,6 +66,9 @@ class LoadedShell(figures.LoadedShell):
         description="(d,) axial force of each brace, tension positive, of slack cables exactly 0 [N]"
     )
     bracing_before: Found[Floats] = Field(description="(d,) the same before the loads [N]")
+    acting: Found[Floats | None] = Field(
+        description="(n, 3) forces of the combination at its factor 1 [N]; None: it does not act by forces alone"
+    )
     modes: Found[Floats] = Field(description="(j, n, 3) lowest linear buckling modes, the largest component being 1")
     mode: Found[Floats | None] = Field(description="(n, 3) how the shell gives way at the limit, or None")
 
@@ -396,6 +399,7 @@ def loaded_shell(
         joint_moments=moments,
         joint_moment_at=names[largest_at(np.abs(moments))] if len(moments) else None,
         slipping=tuple(names[k] for k in _slipping(mesh, used)),
+        acting=None if load.forces is None or load.strains is not None or load.motions is not None else load.forces[:n],
         modes=shapes,
         mode_factors=factors,
         mode=None if path.mode is None else path.mode[:n],

@@ -14,6 +14,7 @@ from rodshell.errors import InputError, OutOfTimeError, OutputWarning
 from rodshell.output.drawings import drawing_set, drawing_svgs, sheet_set
 from rodshell.output.grid import shape_names, shape_of
 from rodshell.output.models import compas_json, glb_bytes, obj_text, rhino_bytes, time_series, vtp_text
+from rodshell.output.opensees import opensees_files
 from rodshell.output.pictures import deployment_picture, picture
 from rodshell.output.schedules import SCHEDULES, table_csv
 from rodshell.progress import Progress, require_progress, silent
@@ -37,7 +38,7 @@ def save(
     """Write the whole result folder, replacing an older result's files and no others; returns its absolute path.
 
     Args:
-        kinds: of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: all but 3dm.
+        kinds: of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: `DEFAULT`.
         force: also replace files that rodshell did not write, or that were changed since, where it has to write.
         progress: called for each kind of files; where it raises OutOfTimeError the archive is written and the kinds
             that are left are not, with a warning that names them.
@@ -222,9 +223,9 @@ KINDS: dict[str, Callable[[Archive], Files]] = {
     "gltf": lambda archive: _models(archive, "glb", glb_bytes, _meshed(archive, archive.final)),
     "vtp": _vtp,
     "compas": lambda archive: _models(archive, "json", compas_json, _meshed(archive, archive.final)),
-    "3dm": _rhino, "png": _png, "report": _report,
+    "3dm": _rhino, "png": _png, "report": _report, "opensees": opensees_files,
 }  # fmt: skip
-DEFAULT = tuple(kind for kind in KINDS if kind != "3dm")  # it needs another package
+DEFAULT = tuple(kind for kind in KINDS if kind not in ("3dm", "opensees"))  # one needs a package, both are for few
 
 _DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
 _STAGES = ("flat", "stage_[0-9]*", f"{POPPED}*")
@@ -244,6 +245,7 @@ NAMES: dict[str, list[str]] = {
     ],
     "compas": [f"model/{state}.json" for state in _SHELLS],
     "3dm": ["model/rodshell.3dm"],
+    "opensees": [f"opensees/{POPPED}*.json", "opensees/replay.py"],
     "png": [
         *(f"pictures/{state}{what}.png" for state in ("flat", *_SHELLS) for what in ("", "-stress")),
         "pictures/pop_up.png",

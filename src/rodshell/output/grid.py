@@ -334,7 +334,7 @@ def outlines(rods: Floats) -> list[Ints]:
     ends_at = dict[int, list[int]]()
     for end, node in enumerate(graph.ends.ravel().tolist()):
         ends_at.setdefault(node, []).append(end)
-    faces = [[node for node in face if node in ends_at] for face in _faces(graph.edges, graph.flat)]
+    faces = [[node for node in face if node in ends_at] for face in faces_of(graph.edges, graph.flat)]
     result, done = list[Ints](), set[int]()
     for face in sorted(faces, key=len, reverse=True):
         here = [node for node in dict.fromkeys(face) if node not in done]
@@ -358,7 +358,7 @@ def opens(outline: Floats) -> bool:
     return bool(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0)
 
 
-def _faces(edges: Ints, flat: Floats) -> list[list[int]]:
+def faces_of(edges: Ints, flat: Floats) -> list[list[int]]:
     """Nodes around each face of a plane graph: from an edge to the next one on its left."""
     both = np.concatenate([edges, edges[:, ::-1]])
     along = flat[both[:, 1], :2] - flat[both[:, 0], :2]

@@ -2,8 +2,8 @@
 
 Rhino files are in millimetres, all others in metres. In VTK two rods share no points, so that a joint can have the
 stress of both; arrays are binary (base64, packed). COMPAS JSON is plain JSON, so that COMPAS need not be installed:
-`compas.json_load("popped_clamped.json")` gives {"rods": [Polyline, ...], "grid": Graph}. glTF 2.0 is binary, y up:
-each rod is swept along its final shape and coloured by the gap to the target.
+`compas.json_load("popped_clamped.json")` gives {"rods": [Polyline, ...], "grid": Graph, "cells": Mesh}. glTF 2.0 is
+binary, y up: each rod is swept along its final shape and coloured by the gap to the target.
 """
 
 import base64
@@ -125,7 +125,35 @@ def compas_json(archive: Archive, state: str) -> str:
         },
         "name": archive.name,
     }
-    return json.dumps({"rods": lines, "grid": graph}, ensure_ascii=False) + "\n"
+    found = {"rods": lines, "grid": graph, "cells": _cells(archive, edge, joint_positions)}
+    return json.dumps(found, ensure_ascii=False) + "\n"
+
+
+def _cells(archive: Archive, edge: dict[str, dict[str, Any]], positions: dict[str, Floats]) -> dict[str, Any]:
+    """The mesh of COMPAS whose vertices are the joints, upper side out."""
+    names = [repr(name) for name in positions]
+    index = {name: k for k, name in enumerate(names)}
+    flat = np.array([*grid.joint_places(archive, archive.states["flat"]).values()]).reshape(-1, 3)
+    pairs = np.array([(index[a], index[b]) for a, to in edge.items() for b in to], dtype=np.intp).reshape(-1, 2)
+    faces = [face if grid.opens(flat[face[::-1], :2]) else [] for face in grid.faces_of(pairs, flat)]
+    vertex = [{"joint": name} | dict(zip("xyz", at.tolist(), strict=True)) for name, at in positions.items()]
+    found = [face for face in faces if len(face) > 2]
+    return {
+        "dtype": "compas.datastructures/Mesh",
+        "data": {
+            "attributes": {},
+            "default_vertex_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},
+            "default_edge_attributes": {},
+            "default_face_attributes": {},
+            "vertex": {str(k): known for k, known in enumerate(vertex)},
+            "face": {str(k): face for k, face in enumerate(found)},
+            "facedata": {},
+            "edgedata": {},
+            "max_vertex": len(vertex) - 1,
+            "max_face": len(found) - 1,
+        },
+        "name": archive.name,
+    }
 
 
 def rhino_bytes(archive: Archive) -> bytes:

@@ -17,9 +17,11 @@ from rodshell.figures.form import Bent, Rod
 from rodshell.figures.records import Ends
 from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
+from rodshell.loads.settings import Cables
 from rodshell.loads.strength import Limits
 from rodshell.results.judged.supports import in_the_air
 from rodshell.results.results import Drawings, Results
+from rodshell.results.states import ACTING
 from rodshell.results.verdict import verdict
 from rodshell.rods.supports import finals_first
 
@@ -230,18 +232,27 @@ def loaded_results(results: Results, mesh: GridMesh, checks: LoadChecks) -> Resu
             for ends, alone in results.self_weight.items()
         },
     )
+    if isinstance(cables := checks.asked.bracing, Cables) and found.fabrication:
+        rod = cables.rod
+        made = found.fabrication.changed(
+            cable_stiffness=rod.stretch_stiffness, cable_mass_per_length=rod.mass_per_length
+        )
+        found = found.changed(fabrication=made)
     late = f"the loads were not checked: {checks.refused}" if checks.refused else checks.stopped
     return found.changed(status=late) if late and found.status == "converged" else found
 
 
 def loaded_states(checks: LoadChecks) -> dict[str, NDArray[Any]]:
     """What states.npz holds of them: node positions (n, 3) [m] and stress (k,) [Pa], the mode at the limit and the
-    lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter"."""
+    lowest linear buckling modes (n, 3), by end condition and combination, as "loaded_pinned_winter"; forces that act
+    (n, 3) [N], as "acting_pinned_winter"."""
     states: dict[str, NDArray[Any]] = {}
     for name, by_ends in checks.shells.items():
         for ends, shell in by_ends.items():
             found = {"": shell.positions, "stress_": shell.stress, "mode_": shell.mode}
             states |= {f"loaded_{what}{ends}_{name}": each for what, each in found.items() if each is not None}
+            if shell.acting is not None:
+                states[f"{ACTING}{ends}_{name}"] = shell.acting
             states |= {f"loaded_buckling_{ends}_{name}_{k}": mode for k, mode in enumerate(shell.modes, start=1)}
     return states
 

@@ -31,6 +31,7 @@ COMPRESSION = 1  # half the time of NumPy's 6, for files that are 6 % longer
 
 DRAPED, POPPED = "draped", "popped_"  # the states in space: the second with the name of a support
 GAP = "gap_"  # of a state in space: with the name of its support, or draped
+ACTING = "acting_"  # forces on the nodes, of a support and a combination of loads
 BENT = ("curvature", "stress")  # known at each entry of `rod_nodes`
 INDICES = ("rod_nodes", "rod_start", "target_faces")
 DAMAGED = "cannot be read: it is damaged or not written by rodshell; run case.toml again"
@@ -167,7 +168,7 @@ def _shapes(states: States, count: int, results: Results) -> Iterator[tuple[str,
             yield name, (count,)
         elif name.partition("_")[0] in (*BENT, "force"):
             yield name, (entries,)
-        elif name.startswith("loaded_"):
+        elif name.startswith(("loaded_", ACTING)):
             yield name, (entries,) if name.startswith("loaded_stress_") else (count, 3)
 
 

@@ -3,6 +3,7 @@
 import logging
 import os
 import secrets
+import shutil
 from collections import deque
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,6 +16,7 @@ from rodshell.studio.process import WorkerProcess
 from rodshell.studio.worker import News, Order
 from rodshell.untrusted import limit, raised
 
+UPLOADS = "uploads"  # folder of a job's files
 WAITING = 100  # jobs that wait at once
 
 
@@ -54,11 +56,12 @@ class Jobs:
             if status["status"] in ("queued", "running"):
                 self._queue.append((path.parent.name, status["case"]))
 
-    def add(self, case: dict[str, Any], size: int) -> str:
+    def add(self, case: dict[str, Any], size: int, uploads: Path | None = None) -> str:
         """Queue a case; the id of its job.
 
         Args:
             size: of the case [bytes].
+            uploads: folder of the files that it may name, of which the job keeps copies; None: it may name none.
 
         Raises:
             InputError: too many jobs wait, or there is no room for another.
@@ -67,9 +70,12 @@ class Jobs:
             raise InputError(
                 f"{limit(WAITING):g} jobs wait already: try again later, {raised(WAITING, len(self._queue) + 1)}"
             )
-        self._room.make(2 * BLOCK + size)
+        files = [] if uploads is None else [path for path in uploads.iterdir() if path.is_file()]
+        self._room.make((2 + len(files)) * BLOCK + size + sum(path.stat().st_size for path in files))
         name = secrets.token_urlsafe(18)
-        (self.folder / name).mkdir(parents=True)
+        (self.folder / name / UPLOADS).mkdir(parents=True)
+        for path in files:
+            shutil.copyfile(path, self.folder / name / UPLOADS / path.name)
         write_record(self.folder / name / "status.json", {"status": "queued", "case": case})
         self._queue.append((name, case))
         self.run_next()
@@ -107,8 +113,9 @@ class Jobs:
             self._serial += 1
             self._running = (name, self._serial, case)
             self._write(name, {"status": "running", "case": case})
-            folder = str(self.folder / name / "result")
-            self._worker.order(Order(self._serial, "job", case, time_limit=self._time_limit, folder=folder))
+            folder, uploads = (str(self.folder / name / part) for part in ("result", UPLOADS))
+            order = Order(self._serial, "job", case, time_limit=self._time_limit, folder=folder, uploads=uploads)
+            self._worker.order(order)
 
     def _hear(self, news: News) -> None:
         if self._running is None or news.serial != self._running[1] or news.kind not in ("done", "failed"):

@@ -377,7 +377,12 @@ async def _new_job(request: Request) -> Response:
         raise InputError(_NO_CASE)
     _refuse_unwritable(case)
     jobs: Jobs = request.app.state.jobs
-    return JSONResponse({"id": jobs.add(case, len(body))}, 202)
+    uploads: Path | None = None
+    if name := request.query_params.get("session"):
+        if (session := request.app.state.sessions.get(name)) is None:
+            return _missing("session")
+        uploads = session.uploads
+    return JSONResponse({"id": jobs.add(case, len(body), uploads)}, 202)
 
 
 def _refuse_unwritable(case: dict[str, Any]) -> None:

@@ -106,7 +106,7 @@ def job_of(order: Order) -> Job:
 
     def uploaded(value: object) -> str:
         name = value.removeprefix(UPLOAD) if isinstance(value, str) and value.startswith(UPLOAD) else ""
-        if not (name and order.uploads and name in os.listdir(order.uploads)):
+        if not (name and os.path.isdir(order.uploads) and name in os.listdir(order.uploads)):
             raise InputError("the studio reads only files that were uploaded: upload it first")
         return str(Path(order.uploads) / name)
 

@@ -17,6 +17,7 @@ from rodshell.arrays import Floats, Ints
 from rodshell.errors import InputError
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.targets.apart import cause
+from rodshell.targets.compas_files import COMPAS_FILES, read_compas
 from rodshell.targets.curve_files import read_curves
 from rodshell.targets.freeform import Freeform
 from rodshell.targets.mesh_files import (
@@ -42,6 +43,7 @@ File = str | PathLike[str]
 
 _READERS: dict[str, tuple[str, Callable[[Path, str | None], FileSurface]]] = {  # and the kind of target
     **dict.fromkeys(MESH_FILES, ("mesh", read_mesh)),
+    **dict.fromkeys(COMPAS_FILES, ("mesh", read_compas)),
     **dict.fromkeys(RHINO_FILES, ("nurbs", read_3dm)),
     **dict.fromkeys(STEP_FILES, ("nurbs", read_step)),
 }
