@@ -26,7 +26,7 @@ from rodshell.loads.check import Estimate, check_shells, estimate
 from rodshell.loads.settings import Cables, Laths
 from rodshell.loads.stability import MOST
 from rodshell.progress import Progress
-from rodshell.results.load_reserve import least_carried
+from rodshell.results.judged.loads import least_carried
 from rodshell.results.wording import percent, rounded, rounded_down
 from rodshell.rods.materials import Material, PresetName
 from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, size_text

@@ -23,7 +23,7 @@ from rodshell.refining.acceptance import Refined, refined
 from rodshell.refining.variables import Family
 from rodshell.results.archive import read_inputs
 from rodshell.results.from_form import rod_type
-from rodshell.results.own_weight import ENOUGH, RESERVE
+from rodshell.results.judged.own_weight import ENOUGH, RESERVE
 from rodshell.results.summary import chosen, rod_text
 from rodshell.rods.section import GivenSection, Rod, size_text
 from rodshell.rods.supports import PINNED
