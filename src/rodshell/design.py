@@ -44,6 +44,7 @@ LEFT = {
 NEAR = 1.1  # strains are in proportion to the depth, except those by the prestress of cables
 GAIN = 1.5  # exponent of the spacing's inverse by which factors grow at most: .9 to 1.3 were measured
 LIKELY = 1.15  # a path is followed if the reserve may be reached by so much more than is estimated
+RISES = 1.1  # times the share of its own weight that a bare shell carried before: less has not helped
 PRESTRAIN, ROPE, THIN_ROPE, THIN = (
     5e-4,
     0.006,
@@ -106,6 +107,7 @@ class Search:
     left: dict[str, float] = field(default_factory=lambda: dict(LEFT))
     hope: dict[str, float] = field(default_factory=dict)
     deepest: float = inf
+    bare: float = 0.0
     best: Tried | None = None
     best_factor: float = -1.0
     guessed: Tried | None = None
@@ -149,7 +151,9 @@ class Search:
         *_, closest = spacings = tuple(spacings)
         for spacing in spacings:
             yield from ((spacing, bracing) for bracing in bracings if spacing <= self.hope.get(bracing, inf))
-        if self.hope and closest not in [step.spacing for step in self.steps]:  # what cannot be is shown there
+        if max(self.hope.values(), default=0.0) and closest not in [
+            step.spacing for step in self.steps
+        ]:  # what cannot be is shown there
             yield closest, max(self.hope, key=lambda bracing: self.hope[bracing])
 
     def _stands(self, spacing: float, bracing: str) -> Form | None:
@@ -158,6 +162,8 @@ class Search:
             bare, guess = tried.known.bare, self.left[bracing] * tried.linear
             if bare < 1:
                 closer = spacing * (bare * LIKELY) ** (1 / GAIN)
+                closer *= bare > RISES * self.bare  # where it has not helped, closer ones do not either
+                self.bare = bare
                 self.hope |= {kind: min(closer, self.hope.get(kind, inf)) for kind in LEFT}
                 self._keep(tried, 0.0)
                 self._say(tried, "estimate", bare, "falls under its own weight before it is braced")
