@@ -148,7 +148,7 @@ def test_lack_of_memory_is_one_sentence(tmp_path: Path) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (3_000_000_000, 3_000_000_000))
 
     code = (
-        "import numpy, rodshell.cli.form as form; form.load_case = lambda *_: numpy.empty(10**10); "
+        "import numpy, rodshell.cli.options as options; options.load_case = lambda *_: numpy.empty(10**10); "
         "from rodshell.cli import main; raise SystemExit(main(['form', 'hemisphere']))"
     )
     ended = subprocess.run(

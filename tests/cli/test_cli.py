@@ -562,7 +562,8 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     """So that a wrong unit, or a file without a target, shows."""
     Path("empty.toml").write_text("rod.material.preset = 'rubber'")
     assert main(["form", "empty.toml"]) == 0
-    sizes, rod = capsys.readouterr().err.splitlines()[:2]
+    sizes, *others = capsys.readouterr().err.splitlines()
+    (rod,) = (line for line in others if line.startswith("rodshell: rod: "))
     assert sizes == "rodshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm"
     assert rod.startswith("rodshell: rod: circle, radius 1 mm; E = 1 MPa")
     assert rod.endswith(
@@ -570,7 +571,8 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     )
     Path("big.toml").write_text("target = { radius = 200 }\nlayout.spacing = 25\nrod.material.preset = 'rubber'")
     assert main(["form", "big.toml"]) == 0
-    sizes, rod = capsys.readouterr().err.splitlines()[:2]
+    sizes, *others = capsys.readouterr().err.splitlines()
+    (rod,) = (line for line in others if line.startswith("rodshell: rod: "))
     assert sizes == "rodshell: hemisphere, 400 m wide; edge 4.17 m"
     assert rod.startswith("rodshell: rod: circle, radius 1000 mm; ")
     assert main(["form", "empty.toml", "--drawings.name", "bandstand", "--out", "named"]) == 0

@@ -23,7 +23,7 @@ WORDS = {  # names, titles and formulas: nothing opens a file of this name
     *(f"loads.{name}" for name in ("name", "coefficient", "supports")),
     *("combinations.name", "combinations.factors", "seams.patches.name", "target.formula", "target.object"),
     *("refine.under", "refine.vary", "bracing.pattern", "stability.imperfection", "layout.left_out", "layout.names"),
-    *("supports.at", "combinations.deflection"),
+    *("supports.at", "combinations.deflection", "design.open"),
 }  # fmt: skip
 
 

@@ -42,7 +42,7 @@ def opensees_files(archive: Archive) -> Iterator[tuple[str, str]]:
 def _left_out(archive: Archive, states: list[str]) -> Iterator[str]:
     """What of a shell the format does not hold."""
     results = archive.results
-    kind = results.joint.kind if results.joint else None
+    kind = (results.joint.kind if results.joint else None) or "ball"
     if not states or "rod_nodes" not in archive.states or results.rod is None:
         yield "the result has no popped-up shape: run its case until one is found"
     if results.flat_state is not None:

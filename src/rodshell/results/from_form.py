@@ -49,8 +49,9 @@ def results_of(stages: Stages) -> Results:
         "joint": figures.Joint.model_validate(plain(joint_parameters(stages.joint))),
         **_grid(stages.footprint, stages.boundary.points, stages.dropped, stages.rod),
         "pop_up": _pop_ups(stages),
-        "edge_beams": tuple(_edge_beams(stages)),
     }
+    if beams := tuple(_edge_beams(stages)):
+        known["edge_beams"] = beams
     if stages.from_table:
         return Results(**_head("rods", stages.status, stages.warnings), **known)
     known |= {
