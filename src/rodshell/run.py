@@ -152,7 +152,7 @@ class Run:
                 status = str(late)
             if status != "converged":  # what was found before is kept
                 if self.announce is not None:
-                    self.announce(f"rods of {size_text(section)} fit better, but were not popped up: {status}")
+                    self.announce(f"{size_text(section)} fits better, but was not popped up: {status}")
                 break
             rod, stages = following, found
         return rod, fit, stages

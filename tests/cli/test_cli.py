@@ -564,7 +564,7 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     assert main(["form", "empty.toml"]) == 0
     sizes, rod = capsys.readouterr().err.splitlines()[:2]
     assert sizes == "rodshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm"
-    assert rod.startswith("rodshell: rod: circle, radius 1 mm; E = 1 MPa")
+    assert rod.startswith("rodshell: rod: rod 2 mm; E = 1 MPa")
     assert rod.endswith(
         "; section was not given: chosen to fit, as slender as the paper's rods, since no strength is known"
     )
@@ -572,7 +572,7 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     assert main(["form", "big.toml"]) == 0
     sizes, rod = capsys.readouterr().err.splitlines()[:2]
     assert sizes == "rodshell: hemisphere, 400 m wide; edge 4.17 m"
-    assert rod.startswith("rodshell: rod: circle, radius 1000 mm; ")
+    assert rod.startswith("rodshell: rod: rod 2000 mm; ")
     assert main(["form", "empty.toml", "--drawings.name", "bandstand", "--out", "named"]) == 0
     assert capsys.readouterr().err.startswith("rodshell: bandstand, 400 mm wide; ")
     assert main(["form", "empty.toml", "--quiet", "--out", "quiet"]) == 0

@@ -381,16 +381,16 @@ def test_lengths_of_the_case_follow_the_rounding() -> None:
 
 @pytest.mark.parametrize(
     ("rod", "line"),
-    [(ROD, "circle, radius 1 mm; E = 1 MPa, 1000 kg/m3 (the paper's rubber; for another: rod.material)"),
+    [(ROD, "rod 2 mm; E = 1 MPa, 1000 kg/m3 (the paper's rubber; for another: rod.material)"),
      (rs.Rod(rs.Tube(0.02, 0.003), rs.Material(25e9, 1900.0)),
-      "tube, radius 20 mm, thickness 3 mm; E = 25 GPa, 1900 kg/m3 (Poisson's ratio is the paper's rubber's; "),
+      "tube 40 x 3 mm; E = 25 GPa, 1900 kg/m3 (Poisson's ratio is the paper's rubber's; "),
      (rs.Rod(rs.Circle(0.02), rs.Material(11e9, 1000.0)),
-      "circle, radius 20 mm; E = 11 GPa, 1000 kg/m3 (density and Poisson's ratio are the paper's rubber's; for"),
-     (rs.Rod(rs.Circle(0.02), rs.Material(25e9, 1900.0, 0.3)), "circle, radius 20 mm; E = 25 GPa, 1900 kg/m3"),
+      "rod 40 mm; E = 11 GPa, 1000 kg/m3 (density and Poisson's ratio are the paper's rubber's; for"),
+     (rs.Rod(rs.Circle(0.02), rs.Material(25e9, 1900.0, 0.3)), "rod 40 mm; E = 25 GPa, 1900 kg/m3"),
      (rs.Rod(rs.RectangularSection(0.012, 0.05), rs.Material(11e9, 470.0, shear=0.69e9)),
-      "rectangle, width 12 mm, height 50 mm; E = 11 GPa, 470 kg/m3"),
+      "lath 12 x 50 mm; E = 11 GPa, 470 kg/m3"),
      (rs.Rod(rs.Circle(0.02), rs.Material.preset("larch", poisson_ratio=0.3, density=650.0)),
-      "circle, radius 20 mm; larch, E = 12 GPa, 650 kg/m3 (density and Poisson's ratio not larch's)"),
+      "rod 40 mm; larch, E = 12 GPa, 650 kg/m3 (density and Poisson's ratio not larch's)"),
      (rs.Rod(rs.GivenSection(1e6, 20.0, 30.0, 5.0)), "given, EA 1000000 N, EI1 20 N m\N{SUPERSCRIPT TWO}")],
 )  # fmt: skip
 def test_the_summary_names_the_rod(rod: rs.Rod, line: str) -> None:

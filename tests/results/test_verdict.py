@@ -748,9 +748,9 @@ LATHS = [
 @pytest.mark.parametrize(
     ("factor", "words"),
     # 5 x 15 mm: (15/10)^2 at least, (5/3) of 40 %; then sqrt(1.5 x 1.05 / factor) times as thick, and as much of 40 %
-    [(1.41, "made of 5 x 15 mm, it would carry about 1.58 times its own weight or more with pinned ends, using 67 % of "
+    [(1.41, "made of lath 5 x 15 mm, it would carry about 1.58 times its own weight or more with pinned ends, using 67 % of "
             "larch's permanent design strength"),
-     (0.71, "made of 5 x 15 mm, it would carry about 1.59 times its own weight or more with clamped ends, using 67 % "
+     (0.71, "made of lath 5 x 15 mm, it would carry about 1.59 times its own weight or more with clamped ends, using 67 % "
             "of larch's permanent design strength"),
      (0.3, "made of rods about 2.3 times as thick, it would carry 1.5 times its own weight with clamped ends, by "
            "an estimate, using 92 % of"),
@@ -766,8 +766,8 @@ def test_rods_that_would_carry_their_own_weight_are_named(factor: float, words: 
 
 @pytest.mark.parametrize(
     ("factor", "words"),
-    [(1.41, "; its section was chosen without regard to its weight; made of 5 x 15 mm, it would carry about"),
-     (0.71, "; its section was chosen without regard to its weight; made of 5 x 15 mm, it would carry about"),
+    [(1.41, "; its section was chosen without regard to its weight; made of lath 5 x 15 mm, it would carry about"),
+     (0.71, "; its section was chosen without regard to its weight; made of lath 5 x 15 mm, it would carry about"),
      (0.1, "; its section was chosen without regard to its weight, and no size that is sold is likely to carry "
            "it and to withstand its bends; made of rods about 4 times as thick")],
 )  # fmt: skip

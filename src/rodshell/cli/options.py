@@ -19,7 +19,7 @@ ALIASES = {path: f"--{path.partition('.')[2]}" for path in (
     "target.radius", "target.formula", "target.unit", "target.up", "target.base", "target.boundary",
     "layout.rods", "layout.spacing", "layout.length", "layout.edge", "layout.rotate",
     "drape.anchor", "drape.method", "drape.objective", "refine.vary",
-)}  # fmt: skip
+)} | {"rod.section": "--rod"}  # fmt: skip
 
 
 def _parameter(path: str) -> str:

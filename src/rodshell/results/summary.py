@@ -16,12 +16,12 @@ from rodshell.results.supports import share_of_span
 from rodshell.results.verdict import CONVERGED, UNLOADED, unknown_below, verdict_of
 from rodshell.results.wording import (
     NAMES,
-    case_rows,
     figure,
     percent,
     rounded,
     rounded_down,
     rounding_of,
+    section_text,
     share_of_weight,
     shown_factor,
     shown_length,
@@ -73,7 +73,7 @@ def chosen(parts: Iterable[str]) -> str:
 
 def rod_text(rod: RodType) -> str:
     """Section and material in a few words, and whether it is the paper's rubber."""
-    line = ", ".join(" ".join(row) for row in case_rows(rod.section)).removeprefix("kind ")
+    line = section_text(rod.section)
     material = rod.material
     if material is None:
         return line
