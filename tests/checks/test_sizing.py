@@ -168,7 +168,7 @@ def test_the_rod_that_was_chosen_is_announced_said_in_the_summary_and_kept(
 ) -> None:
     options = ["--formula", "2*cos(x/6)*cos(y/5)", "--target.radius", "6 m", "--spacing", "1.5 m", "--pop_up.ends"]
     out = str(tmp_path / "roof")
-    assert main(["form", "heightfield", *options, "clamped", "--only", "csv", "--out", out]) == 0
+    assert main(["form", "heightfield", *options, "clamped", "-v", "--only", "csv", "--out", out]) == 0
     said = capsys.readouterr()
     (announced,) = [line for line in said.err.splitlines() if line.startswith("rodshell: rod: ")]
     assert "gfrp, E = 23 GPa" in announced
@@ -370,12 +370,14 @@ def test_a_summary_claims_no_share_of_the_strength_that_is_not_so(tmp_path: Path
     found = rs.read(out).results
     bent = found.bending.model_copy(update={"pinned": found.bending.pinned.model_copy(update={"utilisation": 0.98})})
     assert "sized for the permanent strength; reached 98 % in the final" in (
-        summary_text(found.model_copy(update={"bending": bent}))
+        summary_text(found.model_copy(update={"bending": bent}), verbose=True)
     )
-    assert "thinner than any size" not in summary_text(found)
+    assert "thinner than any size" not in summary_text(found, verbose=True)
     thin = found.rod.model_copy(update={"section": rs.figures.form.Section(kind="circle", radius=0.4e-3)})
     unsold = found.model_copy(update={"rod": thin})
-    assert "; thinner than any size that is sold, the first of which is rod 1 mm\n" in summary_text(unsold)
+    assert "; thinner than any size that is sold, the first of which is rod 1 mm\n" in summary_text(
+        unsold, verbose=True
+    )
     assert any(
         reason.startswith("the chosen section is thinner than any size that is sold") and "rod 1 mm" in reason
         for reason in verdict(unsold).reasons
