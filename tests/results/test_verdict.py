@@ -750,8 +750,8 @@ LATHS = [
 @pytest.mark.parametrize(
     ("factor", "words"),
     # 5 x 15 mm: (15/10)^2 at least, (5/3) of 40 %; then sqrt(1.5 x 1.05 / factor) times as thick, and as much of 40 %
-    [(1.41, "made of lath 5 x 15 mm, it would carry about 1.58 times its own weight or more with pinned ends, using 67 % "
-            "of larch's permanent design strength"),
+    [(1.41, "made of lath 5 x 15 mm, it would carry about 1.58 times its own weight or more with pinned ends, using "
+            "67 % of larch's permanent design strength"),
      (0.71, "made of lath 5 x 15 mm, it would carry about 1.59 times its own weight or more with clamped ends, using "
             "67 % of larch's permanent design strength"),
      (0.3, "made of rods about 2.3 times as thick, it would carry 1.5 times its own weight with clamped ends, by "
