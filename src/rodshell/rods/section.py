@@ -298,7 +298,7 @@ IN_WORDS = Value(section_keys)
 """Mark of a section that words may stand for."""
 SHAPES: dict[str, type[Section]] = {shape.kind: shape for shape in (Circle, Tube, Ellipse, RectangularSection)}
 SectionKeys = Annotated[Table, IN_WORDS]
-SECTION_HELP = 'section in words, in mm: "rod 12", "tube 32x3", "lath 12x40", "strip 2x40"'
+SECTION_HELP = 'in words, in mm: "rod 12", "tube 32x3", "lath 12x40", "strip 2x40"'
 
 
 def section_from(words: str) -> Section:
