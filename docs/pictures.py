@@ -1,24 +1,44 @@
 """Makes the pictures of the README and of the lattices: `python docs/pictures.py`."""
 
+from io import BytesIO
 from pathlib import Path
 from runpy import run_path
+
+from PIL import Image
 
 from rodshell.job import Job
 from rodshell.output.pictures import picture, picture_svg
 from rodshell.output.png import drawing_png
+from rodshell.results.archive import Archive
 
 FOLDER = Path(__file__).parent / "pictures"
 EXAMPLES = Path(__file__).parents[1] / "examples"
 LATTICES = ("chebyshev", "geodesic", "three_families", "asymptotic")  # examples of this name
+STAGES, PAUSE, STEP = 24, 1500, 100  # of the deployment that moves; ms
+WIDE = 600  # pixels
 
 
 def main() -> None:
-    archive = Job.load("pavilion").run().archive()
-    (FOLDER / "pavilion-flat.svg").write_text(picture_svg(archive, "flat"), encoding="utf-8")
-    (FOLDER / "pavilion-pinned.svg").write_text(picture_svg(archive, "popped_pinned", "stress"), encoding="utf-8")
+    (FOLDER / "pavilion.gif").write_bytes(moving(Job.load("pavilion", checks__stages=STAGES).run().archive()))
+    refined = Job.load("hemisphere", pop_up__ends="pinned", refine__vary="taper").run()
+    for name, form in (("hemisphere", Job.load("hemisphere", pop_up__ends="pinned").run()), ("tapered", refined)):
+        (FOLDER / f"{name}.svg").write_text(picture_svg(form.archive(), "popped_pinned", "gap"), encoding="utf-8")
     for name in LATTICES:
         archive = run_path(str(EXAMPLES / f"{name}.py"))["form"].archive()
         (FOLDER / f"{name}.png").write_bytes(drawing_png(picture(archive, "popped_pinned")))
+
+
+def moving(archive: Archive) -> bytes:
+    """The deployment, from nearly flat to nearly the shell, and a pause, as a GIF that repeats."""
+    frames = [drawing_png(picture(archive, f"stage_{k}", "stress")) for k in range(1, STAGES)]
+    small = [Image.open(BytesIO(frame)).convert("RGB") for frame in frames]
+    small = [frame.resize((WIDE, WIDE * frame.height // frame.width)) for frame in small]
+    palette = small[-1].quantize(64)  # of all, or colours would flicker
+    small = [frame.quantize(palette=palette) for frame in small]
+    file = BytesIO()
+    waits = [PAUSE // 2, *[STEP] * (len(small) - 2), PAUSE]
+    small[0].save(file, "GIF", save_all=True, append_images=small[1:], duration=waits, loop=0, optimize=True)
+    return file.getvalue()
 
 
 if __name__ == "__main__":

@@ -97,7 +97,7 @@ WRONG = [
     (lambda: rs.Material(1e6, 1e-300), "density must be at least 1e-06 kg/m3, not 1e-300 kg/m3"),
     (lambda: rs.Circle(None), "section radius must be a number in m, not None"),
     (lambda: rs.Tube(0.02, "3 mm"), 'section thickness must be a number in m, not "3 mm"'),
-    (lambda: rs.Tube(0.01, 0.02), "tube thickness 0.02 m is larger than its radius 0.01 m"),
+    (lambda: rs.Tube(0.01, 0.02), "a tube's wall of 20 mm is thicker than half of its diameter, 20 mm"),
     (lambda: rs.Ellipse(0.1, [0.2]), "half-axis b must be a number in m, not a list"),
     (lambda: rs.RectangularSection(0.0, 0.1), "section width must be positive, not 0.0 m"),
     (lambda: rs.GivenSection(**GIVEN | {"GJ": "1"}), 'GJ must be a number in N m2, not "1"'),

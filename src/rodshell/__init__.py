@@ -83,7 +83,7 @@ if TYPE_CHECKING:
     from rodshell.results import Archive, Results, Verdict, read
     from rodshell.rods.local_energy import LocalEnergy
     from rodshell.rods.materials import Material
-    from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube
+    from rodshell.rods.section import Circle, Ellipse, GivenSection, RectangularSection, Rod, Tube, section_from
     from rodshell.rods.support_groups import (
         Arch,
         ClampedEnds,
@@ -157,7 +157,7 @@ _HOMES = {
         "Arch", "ClampedEnds", "EdgeBeam", "FreeEnds", "HeldEnds", "Ring", "SlidingEnds", "SprungEnds", "SupportGroups",
     ),
     "rodshell.rods.materials": ("Material",),
-    "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube"),
+    "rodshell.rods.section": ("Circle", "Ellipse", "GivenSection", "RectangularSection", "Rod", "Tube", "section_from"),
     "rodshell.solve.problem": ("Damping", "ExplicitForce", "GravityForce", "ImplicitForce", "PointLoads"),
     "rodshell.solve.implicit_euler": ("ImplicitEuler", "Motion"),
     "rodshell.solve.rod_statics": ("RodLoads", "RodShape", "RodSupports", "solve_rod"),
@@ -186,8 +186,8 @@ __all__ = [
     "SprungEnds", "Stability", "StabilityError", "Strength", "Support", "SupportGroups", "Target", "Temperature",
     "TimeSeries", "Trimmed", "Tube", "Verdict", "Wind", "__version__", "agreement", "bar", "chebyshev_net", "check",
     "check_loads", "drape", "dynamic_pop_up", "export", "fabricate", "find_form", "heights_from", "map_back",
-    "mesh_grid", "optimise", "pop_up", "pop_up_table", "read", "read_sweep", "refine", "save", "search", "settle",
-    "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
+    "mesh_grid", "optimise", "pop_up", "pop_up_table", "read", "read_sweep", "refine", "save", "search", "section_from",
+    "settle", "simulate", "solve_rod", "straight_rods", "surface_from", "sweep", "trim",
 ]  # fmt: skip
 
 

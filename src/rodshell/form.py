@@ -313,9 +313,9 @@ class Form:
         """
         return self._archive if options is None else self.with_options(options)._archive
 
-    def summary(self) -> str:
-        """One screen of text, all checks done."""
-        return self._archive.summary()
+    def summary(self, *, verbose: bool = False) -> str:
+        """Six lines of text, all checks done; `verbose`: all that was found."""
+        return self._archive.summary(verbose=verbose)
 
     def save(
         self,

@@ -156,7 +156,7 @@ class Run:
                 status = str(late)
             if status != "converged":  # what was found before is kept
                 if self.announce is not None:
-                    self.announce(f"rods of {size_text(section)} fit better, but were not popped up: {status}")
+                    self.announce(f"{size_text(section)} fits better, but was not popped up: {status}")
                 break
             rod, stages = following, found
         return rod, fit, stages
@@ -321,17 +321,14 @@ class Run:
         return all(getattr(before, name) == getattr(now, name) for name in tables)
 
     def _announce_sizes(self, found: Built) -> None:
-        """Which lengths were left to the target's size: a wrong unit shows here."""
-        unit = getattr(self.asked.target, "unit", None)
-        lengths = {
-            "spacing": found.layout.least_spacing if self.asked.layout.spacing == "auto" else None,
-            "edge": found.layout.longest_edge if self.asked.layout.edge == "auto" else None,
-        }
-        said = ", ".join(f"{name} {length_text(length)}" for name, length in lengths.items() if length is not None)
-        if said and self.announce is not None:
-            name, width = self.asked.drawings.name or found.target.name, 2 * found.target.size
-            doubt = "" if lengths["spacing"] is None else doubt_of_unit(width, self.asked.rod.given_section, unit)
-            self.announce(f"{name}, {length_text(width)} wide{doubt}; {said}")
+        """How wide the target is, and a spacing that was left to its size: a wrong unit shows here."""
+        if self.announce is None or "auto" not in (self.asked.layout.spacing, self.asked.layout.edge):
+            return
+        name, width, said = self.asked.drawings.name or found.target.name, 2 * found.target.size, ""
+        if self.asked.layout.spacing == "auto":
+            said = doubt_of_unit(width, self.asked.rod.given_section, getattr(self.asked.target, "unit", None))
+            said += f"; spacing {length_text(found.layout.least_spacing)}"
+        self.announce(f"{name}, {length_text(width)} wide{said}")
 
     def _announce_rod(self, rod: Rod, fit: Fit | None) -> None:
         """A rod of which the case left something open, and what decided its size."""

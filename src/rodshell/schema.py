@@ -14,7 +14,7 @@ table before they are read; what cannot be used together is refused by `__post_i
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass, replace
 from difflib import get_close_matches
 from functools import cache, cached_property
 from math import inf
@@ -45,6 +45,13 @@ class Missing:
     """Mark of a field without which a table cannot be: what to do where it is left out."""
 
     remedy: str
+
+
+@dataclass(frozen=True)
+class Twice:
+    """Mark of a length that another key may give in its place, twice as long: of a radius the diameter."""
+
+    name: str
 
 
 class Inline:
@@ -88,11 +95,12 @@ class Field:
     """A key of a table.
 
     Args:
-        value: how it is read; None: as text, one of `choices`, or tables.
+        value: how it is read; None: as text, one of `choices`, or tables. Of tables, how a text is read as one.
         tables: the classes that it may become, by their kinds.
         choices: the words that it may be.
         any_value: whether it may be something else than these words.
         optional: whether it may be None: left out, or a table without keys.
+        twice: the key that may stand in its place and gives twice as much, or "".
     """
 
     name: str
@@ -108,6 +116,7 @@ class Field:
     inline: bool
     first: bool
     remedy: str
+    twice: str
 
     @cached_property
     def by_kind(self) -> dict[str, type]:
@@ -180,6 +189,7 @@ def _field(name: str, hint: Any, default: Any) -> Field | None:
     return Field(
         key.name, name, help_, value, tables, choices, bool(others), NoneType in types, default,
         rows, inline=Inline in marks, first=key.first, remedy=missing.remedy,
+        twice=next((mark.name for mark in marks if isinstance(mark, Twice)), ""),
     )  # fmt: skip
 
 
@@ -255,7 +265,7 @@ def keys_in(table: type, given: Table = _EMPTY) -> Iterator[tuple[Field | None, 
         yield None, "kind"
     for field in fields_of(table):
         if not field.inline:
-            yield field, field.name
+            yield from ((field, name) for name in (field.name, field.twice) if name)
             continue
         chosen = field.chosen(given)
         yield from keys_in(chosen, given) if chosen else ((None, str(key)) for key in ("kind", *given))
@@ -294,6 +304,11 @@ def _read(table: type[T], given: Table, place: Place, files: Files | None) -> T:
             inside = {key: given[key] for _, key in keys_in(field.tables[0], given) if key in given}
             if _says_something(inside) or not field.optional:
                 values[field.attribute] = _one_table(field, given if field.by_kind else inside, place, files)
+        elif field.twice and field.twice in given:
+            if field.name in given:
+                raise InputError(f"{place.name(field.twice)} and {field.name} are given: leave one of them out")
+            double = _value(replace(field, name=field.twice), given[field.twice], place, files)
+            values[field.attribute] = double if isinstance(double, str) else double / 2
         elif field.name in given:
             values[field.attribute] = _value(field, given[field.name], place, files)
         elif field.default is MISSING:
@@ -317,13 +332,15 @@ def _value(field: Field, given: Any, place: Place, files: Files | None) -> Any:
         raise InputError(f"{name} = {shown(given)}: {field.wanted}")
     if field.rows:
         return tuple(_one_table(field, inside, within, files) for within, inside in _tables_in(field, given, place))
+    if field.tables and field.value is not None and isinstance(given, str):
+        given = _read_value(name, field.value, given)
     if field.tables:
         left_out = field.optional and isinstance(given, Mapping) and not _says_something(given)
         return None if left_out else _one_table(field, given, place.inside(field.name), files)
     role = field.value.role if field.value is not None else "text"
+    if field.value is not None and not role:
+        return _read_value(name, field.value, given)
     try:
-        if field.value is not None and not role:
-            return field.value.read(given)
         if role == "folder" and files is not None:
             raise ValueError("nothing is written for a case from somebody else: leave it out")
         given = files(given) if role == "file" and files is not None else given
@@ -352,8 +369,12 @@ def _one_table(field: Field, given: Any, place: Place, files: Files | None) -> A
 
 def value_of(hint: Any, name: str, given: object) -> Any:
     """A value of a type of `quantities`; InputError, which calls it by its name."""
+    return _read_value(name, next(mark for mark in _flat(hint)[1] if isinstance(mark, Value)), given)
+
+
+def _read_value(name: str, value: Value, given: object) -> Any:
     try:
-        return next(mark for mark in _flat(hint)[1] if isinstance(mark, Value)).read(given)
+        return value.read(given)
     except ValueError as reason:
         raise InputError(f"{name} = {shown(given)}: {reason}") from None
 

@@ -63,6 +63,7 @@ STAGES = ("--checks.stages", "2")
 SYMMETRIC = JOBS.keys() - {"freeform", "oculus"}  # whose shells have mirror images
 
 _NEW, _AS_ONE = "a new key", "all patches are one shell, carry their weight on one path, and are searched together"
+_TRADE = "offers name a section as the trade does"
 _CELLS = "nodes take exact cells of the target, and their loads with them"
 CHANGED_ON_PURPOSE: dict[str, str] = {
     "*.flat_state": _NEW,
@@ -73,6 +74,8 @@ CHANGED_ON_PURPOSE: dict[str, str] = {
     "table.rods[[]*[]].offset": "a rod of a table has no offset",
     "*.snow": _NEW,
     "*.verdict.unloaded": _NEW,
+    "freeform.verdict.findings*.offers*": _TRADE,
+    "freeform.verdict.reasons*": _TRADE,
     "bumps.ends_in_the_air.*": _CELLS,
     "bumps.loads.*": _CELLS,
     "bumps.states.loaded_*": _CELLS,

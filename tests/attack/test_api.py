@@ -204,6 +204,7 @@ def values() -> dict[str, Call]:
         "read": Call(rs.read, folder="none"),
         "read_sweep": Call(rs.read_sweep, folder="none"),
         "straight_rods": Call(rs.straight_rods, ends=[[(-1.0, 0.0), (1.0, 0.0)], [(0.0, -1.0), (0.0, 1.0)]]),
+        "section_from": Call(rs.section_from, words="tube 32x3"),
         "surface_from": Call(rs.surface_from, file="none.obj"),
         "sweep": Call(rs.sweep, source={}, out="none"),
     }  # fmt: skip

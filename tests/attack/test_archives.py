@@ -62,7 +62,11 @@ def outcome(folder: Path, kinds: list[str]) -> str:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             archive = read(folder)
-            texts = {"the summary": archive.summary(), "its line": repr(archive), **dict(files_of(archive, kinds))}
+            texts = {
+                "the summary": archive.summary(verbose=True),
+                "its line": repr(archive),
+                **dict(files_of(archive, kinds)),
+            }
     except RodshellError as error:
         return "" if str(error).isprintable() else f"not one printable sentence: {error!r}"
     except Exception as error:

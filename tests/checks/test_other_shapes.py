@@ -266,7 +266,7 @@ def test_result_and_summary_say_what_was_found() -> None:
     assert searched["searched"].startswith("looked for from ")
     for one in searched["found"]:
         assert set(one) == {"distance", "energy", "from_flat", "mirror"}
-    lines = archive.summary().splitlines()
+    lines = archive.summary(verbose=True).splitlines()
     assert "  from flat pinned  reached" in lines
     (shapes,) = [line for line in lines if line.startswith("  shapes")]
     assert shapes.endswith(searched["searched"])

@@ -52,8 +52,8 @@ class FakeArchive:
         folder.put("case.toml", self.case_toml)
         folder.commit()
 
-    def summary(self) -> str:
-        return "agreement 0.01 mm"
+    def summary(self, *, verbose: bool) -> str:
+        return "agreement 0.01 mm" + ", in full" * verbose
 
 
 @dataclass
@@ -368,7 +368,9 @@ def test_progress_away_from_a_terminal_is_a_line_for_each_stage(
     finder: FakeFinder, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["form", "hemisphere"]) == 0
-    assert capsys.readouterr().err.splitlines() == ["rodshell: net", "rodshell: drape", "rodshell: pop up"]
+    *stages, last = capsys.readouterr().err.splitlines()
+    assert stages == ["rodshell: net", "rodshell: drape", "rodshell: pop up"]
+    assert last.startswith("rodshell: written to ")
 
 
 def test_a_long_silence_is_broken_by_a_line_that_says_everything(
@@ -425,7 +427,7 @@ def test_the_time_limit_is_one_for_the_job_and_the_offer_to_refine_it(
     now = [0.0]
     monkeypatch.setattr("rodshell.progress.monotonic", lambda: now[-1])
     monkeypatch.setattr("rodshell.cli.reporting._offer", offer)
-    assert main(["form", "hemisphere", "--time-limit", "100 s"]) == 0
+    assert main(["form", "hemisphere", "--time-limit", "100 s", "-v"]) == 0
     assert now[-1] == 200.0
 
 
@@ -564,8 +566,8 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     assert main(["form", "empty.toml"]) == 0
     sizes, *others = capsys.readouterr().err.splitlines()
     (rod,) = (line for line in others if line.startswith("rodshell: rod: "))
-    assert sizes == "rodshell: hemisphere, 400 mm wide; spacing 20 mm, edge 3.33 mm"
-    assert rod.startswith("rodshell: rod: circle, radius 1 mm; E = 1 MPa")
+    assert sizes == "rodshell: hemisphere, 400 mm wide; spacing 20 mm"
+    assert rod.startswith("rodshell: rod: rod 2 mm; E = 1 MPa")
     assert rod.endswith(
         "; section was not given: chosen to fit, as slender as the paper's rods, since no strength is known"
     )
@@ -573,8 +575,8 @@ def test_lengths_left_to_the_targets_size_are_said_before_the_job(
     assert main(["form", "big.toml"]) == 0
     sizes, *others = capsys.readouterr().err.splitlines()
     (rod,) = (line for line in others if line.startswith("rodshell: rod: "))
-    assert sizes == "rodshell: hemisphere, 400 m wide; edge 4.17 m"
-    assert rod.startswith("rodshell: rod: circle, radius 1000 mm; ")
+    assert sizes == "rodshell: hemisphere, 400 m wide"
+    assert rod.startswith("rodshell: rod: rod 2000 mm; ")
     assert main(["form", "empty.toml", "--drawings.name", "bandstand", "--out", "named"]) == 0
     assert capsys.readouterr().err.startswith("rodshell: bandstand, 400 mm wide; ")
     assert main(["form", "empty.toml", "--quiet", "--out", "quiet"]) == 0

@@ -491,7 +491,7 @@ def test_a_result_whose_pop_up_from_flat_is_lost_is_a_failure_of_the_computation
         "Not known: the computation did not converge, which says nothing about the shell"
     )
     assert results.pop_up["pinned"].stable is None
-    assert "NOT STABLE" not in summary_text(results)
+    assert "NOT STABLE" not in summary_text(results, verbose=True)
 
 
 def test_a_result_is_popped_up_again_by_the_command(tmp_path):

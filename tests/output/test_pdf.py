@@ -100,7 +100,7 @@ def test_every_sheet_is_a_page_with_a_bookmark_and_the_file_has_a_title(tmp_path
     assert document.get_metadata_value("Creator") == "rodshell"
     assert [bookmark.get_title() for bookmark in document.get_toc()] == [sheet.title for sheet in sheets]
     text = read_text(document[0])
-    for words in ("Pavilion", "0.5 mm", "circle, radius 1 mm", "ball", "Design aid, not code compliance"):
+    for words in ("Pavilion", "0.5 mm", "rod 2 mm", "ball", "Design aid, not code compliance"):
         assert words in text
 
 

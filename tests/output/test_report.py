@@ -224,7 +224,7 @@ def test_the_verdict_comes_first_with_its_colour_and_all_reasons(level: str, tmp
     places = [page.index(text) for text in (notice, f"{words[level]}: the &lt;first&gt; reason", "the second", "<h2>")]
     assert places == sorted(places)
     assert f".{level} {{ --tone: var(--{level}); }}" in page
-    text = replace(made, results=Results.of(result)).summary()
+    text = replace(made, results=Results.of(result)).summary(verbose=True)
     assert text.startswith(f"{made.name}: {words[level]}: the <first> reason\n")
 
 
@@ -293,9 +293,10 @@ def test_no_more_is_said_of_the_deployment_than_was_followed(
     page = page_of(made, tmp_path).read_text()
     assert f"<figcaption>{note}" in page
     assert re.findall(r">(deployment[^<]*)</th>", page) == ([head] if head else [])
-    lines = [line for line in made.summary().splitlines() if line.startswith("  bending   stages")]
+    lines = [line for line in made.summary(verbose=True).splitlines() if line.startswith("  bending   stages")]
     assert len(lines) == (head is not None)
-    assert ("unknown below 56 %" in "".join(lines)) == (lost == 0.5625)  # as the warning has it
+    (used,) = [line for line in made.summary().splitlines() if line.startswith("  stress  ")]
+    assert ("unknown below 56 %" in used) == (lost == 0.5625)  # as the warning has it
 
 
 @pytest.mark.slow
@@ -329,7 +330,7 @@ def test_a_deployment_that_was_not_followed_is_not_included() -> None:
     for stages in ("pop_up", "deployment"):
         del result["bending"][stages]
     assert facts(Results.of(result))[-1].endswith("in the final shape; the deployment from flat was not followed.")
-    assert "bending   stages" not in replace(made, results=Results.of(result)).summary()
+    assert "bending   stages" not in replace(made, results=Results.of(result)).summary(verbose=True)
 
 
 @pytest.mark.parametrize(
@@ -381,21 +382,21 @@ def test_lengths_of_the_case_follow_the_rounding() -> None:
 
 @pytest.mark.parametrize(
     ("rod", "line"),
-    [(ROD, "circle, radius 1 mm; E = 1 MPa, 1000 kg/m3 (the paper's rubber; for another: rod.material)"),
+    [(ROD, "rod 2 mm; E = 1 MPa, 1000 kg/m3 (the paper's rubber; for another: rod.material)"),
      (rs.Rod(rs.Tube(0.02, 0.003), rs.Material(25e9, 1900.0)),
-      "tube, radius 20 mm, thickness 3 mm; E = 25 GPa, 1900 kg/m3 (Poisson's ratio is the paper's rubber's; "),
+      "tube 40 x 3 mm; E = 25 GPa, 1900 kg/m3 (Poisson's ratio is the paper's rubber's; "),
      (rs.Rod(rs.Circle(0.02), rs.Material(11e9, 1000.0)),
-      "circle, radius 20 mm; E = 11 GPa, 1000 kg/m3 (density and Poisson's ratio are the paper's rubber's; for"),
-     (rs.Rod(rs.Circle(0.02), rs.Material(25e9, 1900.0, 0.3)), "circle, radius 20 mm; E = 25 GPa, 1900 kg/m3"),
+      "rod 40 mm; E = 11 GPa, 1000 kg/m3 (density and Poisson's ratio are the paper's rubber's; for"),
+     (rs.Rod(rs.Circle(0.02), rs.Material(25e9, 1900.0, 0.3)), "rod 40 mm; E = 25 GPa, 1900 kg/m3"),
      (rs.Rod(rs.RectangularSection(0.012, 0.05), rs.Material(11e9, 470.0, shear=0.69e9)),
-      "rectangle, width 12 mm, height 50 mm; E = 11 GPa, 470 kg/m3"),
+      "lath 12 x 50 mm; E = 11 GPa, 470 kg/m3"),
      (rs.Rod(rs.Circle(0.02), rs.Material.preset("larch", poisson_ratio=0.3, density=650.0)),
-      "circle, radius 20 mm; larch, E = 12 GPa, 650 kg/m3 (density and Poisson's ratio not larch's)"),
+      "rod 40 mm; larch, E = 12 GPa, 650 kg/m3 (density and Poisson's ratio not larch's)"),
      (rs.Rod(rs.GivenSection(1e6, 20.0, 30.0, 5.0)), "given, EA 1000000 N, EI1 20 N m\N{SUPERSCRIPT TWO}")],
 )  # fmt: skip
 def test_the_summary_names_the_rod(rod: rs.Rod, line: str) -> None:
     made = archive("dome")
-    text = replace(made, results=Results.of({**made.results.plain(), "rod": rod_type(rod)})).summary()
+    text = replace(made, results=Results.of({**made.results.plain(), "rod": rod_type(rod)})).summary(verbose=True)
     (said,) = [one for one in text.splitlines() if one.startswith("  rod ")]
     assert said.startswith(f"  rod       {line}")
     assert said.endswith("rubber's; for another: rod.material)") == ("rubber's;" in line)
@@ -435,13 +436,13 @@ def test_the_page_says_that_the_fewest_bars_are_a_bound(tmp_path: Path) -> None:
 
 def test_a_grid_that_rests_on_its_target_tells_depth_and_not_gap() -> None:
     made = archive("dome")
-    assert "factorisations, gap 0 mm, " in made.summary()
+    assert "factorisations, gap 0 mm, " in made.summary(verbose=True)
     assert ("largest gap", "0.00 mm") not in _drape_rows(made, "gravity")
     for method, word in (("bound", "largest gap"), ("gravity", "deepest inside the target")):
         assert word in [title for title, _ in _drape_rows(made, method)]
     assert made.results.drape is not None
     drape = made.results.drape.changed(method="gravity", max_gap=5.54e-5)
-    text = replace(made, results=made.results.changed(drape=drape)).summary()
+    text = replace(made, results=made.results.changed(drape=drape)).summary(verbose=True)
     assert "deepest node inside by 0.06 mm" in text
 
 

@@ -127,13 +127,13 @@ def test_a_verdict_that_fits_is_whole_and_a_good_one_is_not_said() -> None:
 def test_the_title_block_names_rods_joints_author_and_date() -> None:
     made = styled(wished(), name="Pavilion roof", author="A. Nyone", date="2026-11-22", project="Park", tolerance=5e-4)
     entries = dict(title_block(made, "").entries)
-    assert entries["Section"] == "circle, radius 1 mm"
+    assert entries["Section"] == "rod 2 mm"
     assert entries["Material"].startswith("E 1 MPa, 1000 kg/m")
     assert (entries["Drawn by"], entries["Date"], entries["Project"]) == ("A. Nyone", "2026-11-22", "Park")
     assert (entries["Units"], entries["Tolerance"]) == ("mm, shown to 0.1 mm", "0.5 mm")
     for sheet in sheets(made):
         texts = {text.text for text in sheet.texts}
-        assert set(entries) | {"A. Nyone", "circle, radius 1 mm"} <= texts
+        assert set(entries) | {"A. Nyone", "rod 2 mm"} <= texts
         assert any(text.startswith("Pavilion roof: ") for text in texts)
 
 

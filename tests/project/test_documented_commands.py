@@ -1,15 +1,18 @@
-"""Every command line that README.md and docs/files.md print runs as it stands, in a folder with the files it names."""
+"""Every code block of README.md and of docs/ runs as it stands, alone, in a folder with the files it names."""
 
 import re
 import shlex
+import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from rodshell.case import load_case
 from rodshell.case.rod_ends import COLUMNS
 from rodshell.cli import main, warmup
-from rodshell.job import Job
+from rodshell.sweeps.search_plan import read_search
 
 pytestmark = pytest.mark.slow
 
@@ -20,12 +23,24 @@ QUICK = {
 }
 """What is added to a command so that it does no more than it must."""
 
-README = [
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+ELSEWHERE = ("rodshell studio", "rodshell paper", "--address", "--dry-run")
+"""What is not run here: a server, figures of the paper (minutes), a cluster; plans are read without a dry run."""
+
+
+def blocks(language: str) -> list[Any]:
+    """The code blocks of a language, of README.md and of all pages of docs/, named by page and number."""
+    found = {page.name: re.findall(rf"```{language}\n(.*?)```", page.read_text(), re.DOTALL) for page in PAGES}
+    return [pytest.param(text, id=f"{page}-{k}") for page, texts in found.items() for k, text in enumerate(texts, 1)]
+
+
+SHELL = [
     line
-    for block in re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    for line in re.split(r"\n|&&", block)
-    if line.strip().startswith("rodshell ")
+    for block in blocks("sh")
+    for line in re.split(r"\n|&&", block.values[0])
+    if line.strip().startswith("rodshell ") and not any(word in line for word in ELSEWHERE)
 ]
+SHELL = [line for line in SHELL if "sweep.toml" not in line]  # a page's plans are read below
 FILES = re.findall(r"`(rodshell [^`]*)`", (ROOT / "docs" / "files.md").read_text())
 FILES = [line for line in FILES if "..." not in line and "paper" not in line]  # figures of the paper take minutes
 
@@ -46,6 +61,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "rods.csv").write_text("\n".join([",".join(COLUMNS), *_rods()]))
     assert main(["form", "pavilion", "--out", str(folder / "out" / "pavilion"), "--quiet", *QUICK["form"]]) == 0
     assert main(["form", "hemisphere", "--out", str(folder / "DIR"), "--quiet", *QUICK["form"]]) == 4
+    for name in ("out/mine", "out/dome"):
+        shutil.copytree(folder / ("DIR" if name == "out/dome" else "out/pavilion"), folder / name)
+    lath = 'rod.section = "lath 12x40"\nrod.material.preset = "larch"\njoint.kind = "pin"\n'
+    (folder / "roof.toml").write_text(f'{lath}[target]\nkind = "mesh"\nfile = "roof.obj"\nunit = "mm"\n')
     return folder
 
 
@@ -60,7 +79,7 @@ def _rods() -> list[str]:
     return rows
 
 
-@pytest.mark.parametrize("line", [*README, *FILES])
+@pytest.mark.parametrize("line", [*SHELL, *FILES])
 def test_a_documented_command_runs(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.setattr(warmup, "compile_before_first", lambda **options: 0)
@@ -74,23 +93,50 @@ def test_the_readme_shows_what_the_program_prints(tmp_path: Path, capsys: pytest
     shown = re.search(r"```\n(pavilion: .*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
     assert shown is not None
     assert main(["form", "pavilion", "--out", str(tmp_path / "pavilion"), "--only", "csv"]) == 0
-    printed = capsys.readouterr().out.splitlines()[:-1]  # the last line names the folder
+    printed = capsys.readouterr().out.splitlines()
     number = re.compile(r"\d[\d.]*(e[-+]\d+)?")
     assert [number.sub("#", line) for line in printed] == [number.sub("#", line) for line in shown[1].splitlines()]
 
 
 def test_the_commands_are_found() -> None:
-    assert len(README) > 10
+    assert len(SHELL) > 15
     assert len(FILES) >= 4
+    assert len(blocks("python")) >= 7
+    assert len(blocks("toml")) >= 5
 
 
-@pytest.mark.slow
-def test_the_documented_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All of README.md, then all of docs/files.md, as one script each in a user's folder."""
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for page in (ROOT / "README.md", ROOT / "docs" / "files.md"):
-        for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
-            exec(block, names)
-        Job.load("hemisphere", {"layout.spacing": "60 mm", "checks.stages": 0}).run().save("out/dome", kinds=[])
-    assert names["longer"].reused == ("target", "drape", "trim", "pop-up", "checks")  # type: ignore[attr-defined]
+def test_the_readme_fits_who_has_a_surface() -> None:
+    """Two screens of a builder's words: none of numerics, kernels and compilers."""
+    text = (ROOT / "README.md").read_text()
+    assert len(text.splitlines()) <= 120
+    links = re.sub(r"## Further reading.*", "", text, flags=re.DOTALL)
+    assert not re.search(
+        r"Newton|Hessian|factori[sz]ation|residual|compiler|numba|RODSHELL_KERNELS", links, re.IGNORECASE
+    )
+
+
+@pytest.mark.parametrize("text", blocks("python"))
+def test_a_block_of_python_runs_alone(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    names: dict[str, Any] = {}
+    try:
+        exec(text, names)
+    finally:
+        if server := names.get("server"):  # the studio's
+            server.terminate()
+            server.wait()
+    if again := names.get("longer") or names.get("again"):
+        assert again.reused == ("target", "drape", "trim", "pop-up", "checks")
+
+
+@pytest.mark.parametrize("text", blocks("toml"))
+def test_a_block_of_toml_is_read_alone(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a plan of a sweep or of a search, all of whose designs are read; or else as a case."""
+    monkeypatch.chdir(folder)
+    Path("plan.toml").write_text(text)
+    if "[variables]" in text:
+        assert read_search("plan.toml").variables
+    elif "[axes]" in text:
+        assert main(["sweep", "plan.toml", "--dry-run", "--out", "out/plan"]) == 0
+    else:
+        assert load_case("plan.toml").built_loads() is not None

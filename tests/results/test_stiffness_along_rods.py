@@ -111,7 +111,7 @@ def test_second_laths_are_in_the_stock_plan_and_in_every_total(tmp_path):
         splices = [set(rod[f"{of}splices_from_cut_end_mm"].split("; ")) for of in ("", "second_laths_")]
         assert not set.intersection(*splices) - {""}
     said = f"{1e-3 * sum(second.values()):.1f} m of second laths"
-    assert f"{1e-3 * sum(first.values()):.1f} m, and {said}" in form.summary()
+    assert f"{1e-3 * sum(first.values()):.1f} m, and {said}" in form.summary(verbose=True)
     for name in ("report.html", "drawings/plan.svg"):
         assert said in (folder / name).read_text()
     assert "  S2<" in (folder / "drawings/strips.svg").read_text()

@@ -428,8 +428,10 @@ def test_of_a_section_that_was_chosen_the_verdict_says_to_give_another() -> None
 def test_the_summary_says_what_carries_the_weight_and_what_slips(bracing: list[float], by: str) -> None:
     governs = {"by": by, "rod": "U03", "at": 1.0}
     found = {"limit_factor": 2.0, "bracing": bracing, "utilisation": 0.9, "governs": governs, "at_factor": 1.0}
-    text = summary_text(changed(("loads", {"winter": {"pinned": found}})))
-    assert f"own weight carried{' without bracing' if bracing else ''}: 3 times" in text
+    text = summary_text(changed(("loads", {"winter": {"pinned": found}})), verbose=True)
+    assert f"  carries   own weight{' without bracing' if bracing else ''}: pinned 3 times" in text
+    assert "; winter: pinned 2 times as erected\n" in text
+    assert "  stress    winter: pinned 90 % of the strength\n" in text
     of = "the force at which a joint slips (U03)" if by == "slip" else "the design strength (bending, U03)"
     assert f", 90 % of {of}\n" in text
 
@@ -485,10 +487,10 @@ def test_of_braced_shells_the_reserve_is_asked_with_the_bracing() -> None:
         assert found.level == level
         assert any(words in reason for reason in found.reasons)
         summary = summary_text(changed(*both))
-        assert (f"without bracing: 2 times; with bracing: {factor} times" in summary) == (factor in (1.5, 1.4))
+        said = f"without bracing: pinned 2 times, clamped 2 times; with bracing: pinned {factor} times, clamped 5 times"
+        assert (said in summary) == (factor in (1.5, 1.4))
     snowed = summary_text(changed(*both, ("snow", {"pinned": 310.0, "clamped": None})))  # of the shell without bracing
-    assert "without bracing: 2 times; even snow on top of it: 0.31 kN/m2" in snowed
-    assert "even snow on top of it: 10 kN/m2 or more" in snowed
+    assert "; even snow on top of it: pinned 0.31 kN/m2, clamped 10 kN/m2 or more" in snowed
 
 
 def test_a_shell_that_falls_under_its_own_weight_with_every_support_cannot_be_built() -> None:
@@ -696,10 +698,10 @@ def test_ends_in_the_air_are_counted_with_what_must_hold_them() -> None:
 
 def test_the_summary_says_what_no_load_is_to_blame_for_and_that_none_was_enough() -> None:
     found = {"limit_kind": "none", "utilisation": 1.6, "governs": {"by": "permanent", "rod": "U03", "at": 1.0}}
-    text = summary_text(changed(("loads", {"a long name": {"pinned": found}})))
+    text = summary_text(changed(("loads", {"a long name": {"pinned": found}})), verbose=True)
     assert "  loads     pinned  a long name: stable beyond 100 times the loads; deflection" in text
     assert ", 160 % of the design strength (permanent, U03) before loads act\n" in text
-    turned = summary_text(changed(("deployment.clamped.reached_from_flat", False)))
+    turned = summary_text(changed(("deployment.clamped.reached_from_flat", False)), verbose=True)
     assert "  from flat clamped turning the ends into their clamps ends in another shape\n" in turned
 
 
@@ -716,8 +718,8 @@ def test_joints_that_cannot_be_made_and_what_spans_are_left_are_said() -> None:
         for name, first in (("U1", 0.5), ("U2", 1.9))
     ]  # fmt: skip
     said = {count: summary_text(changed(("rods", rods), ("crossings_without_joint", count))) for count in (0, 1, 8)}
-    assert "  grid      2 rods, 2 joints\n" in said[0]
-    far = "longest span from an end to a joint 1.9 m (U2)\n"
+    assert "  grid      2 rods, 2 joints; " in said[0]
+    far = "longest span from an end to a joint 1.9 m (U2); "
     assert f"2 joints, none at 1 crossing near rod ends; {far}" in said[1]
     assert f"2 joints, none at 8 crossings near rod ends; {far}" in said[8]
 
@@ -749,10 +751,10 @@ LATHS = [
 @pytest.mark.parametrize(
     ("factor", "words"),
     # 5 x 15 mm: (15/10)^2 at least, (5/3) of 40 %; then sqrt(1.5 x 1.05 / factor) times as thick, and as much of 40 %
-    [(1.41, "made of 5 x 15 mm, it would carry about 1.58 times its own weight or more with pinned ends, using 67 % of "
-            "larch's permanent design strength"),
-     (0.71, "made of 5 x 15 mm, it would carry about 1.59 times its own weight or more with clamped ends, using 67 % "
-            "of larch's permanent design strength"),
+    [(1.41, "made of lath 5 x 15 mm, it would carry about 1.58 times its own weight or more with pinned ends, using "
+            "67 % of larch's permanent design strength"),
+     (0.71, "made of lath 5 x 15 mm, it would carry about 1.59 times its own weight or more with clamped ends, using "
+            "67 % of larch's permanent design strength"),
      (0.3, "made of rods about 2.3 times as thick, it would carry 1.5 times its own weight with clamped ends, by "
            "an estimate, using 92 % of"),
      (0.1, "made of rods about 4 times as thick, it would carry 1.5 times its own weight with clamped ends, by "
@@ -767,8 +769,8 @@ def test_rods_that_would_carry_their_own_weight_are_named(factor: float, words: 
 
 @pytest.mark.parametrize(
     ("factor", "words"),
-    [(1.41, "; its section was chosen to withstand its bends; made of 5 x 15 mm, it would carry about"),
-     (0.71, "; its section was chosen to withstand its bends; made of 5 x 15 mm, it would carry about"),
+    [(1.41, "; its section was chosen to withstand its bends; made of lath 5 x 15 mm, it would carry about"),
+     (0.71, "; its section was chosen to withstand its bends; made of lath 5 x 15 mm, it would carry about"),
      (0.1, "; its section was chosen to withstand its bends, and no size that is sold is likely to carry "
            "it and to withstand its bends; made of rods about 4 times as thick")],
 )  # fmt: skip

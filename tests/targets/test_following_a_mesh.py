@@ -80,4 +80,4 @@ def test_the_distance_of_the_vertices_is_the_targets_deviation() -> None:
 
 def test_the_summary_says_how_far_the_surface_is_from_its_mesh() -> None:
     results = Results.of({"target": {"reference_size": 2.0, "deviation": {"max": 0.0123, "rms": 0.004}}})
-    assert "target    smooth surface against the mesh: max 12.3 mm, rms 4.00 mm" in summary_text(results)
+    assert "target    smooth surface against the mesh: max 12.3 mm, rms 4.00 mm" in summary_text(results, verbose=True)

@@ -89,13 +89,15 @@ def _keys_of(table: type, prefix: str = "", kinds: tuple[str, ...] = ()) -> Iter
     for field, name in keys_in(table):
         path = prefix + name
         if field is None or field.rows or not field.tables:
-            help_ = field.help if field else f"kind of {prefix.rstrip('.')}"
+            help_ = field.help.replace(field.name, name) if field else f"kind of {prefix.rstrip('.')}"
             words, others = (field.choices, field.any_value) if field else (kinds, False)
             reads = bool(field and field.value and field.value.role == "file")
             yield CaseKey(path, help_, kinds, words, others, reads)
-        else:
-            for inner in field.tables:
-                yield from _keys_of(inner, f"{path}.", (kind_of(inner),) if field.by_kind else ())
+            continue
+        if field.value is not None:
+            yield CaseKey(path, field.help, kinds)
+        for inner in field.tables:
+            yield from _keys_of(inner, f"{path}.", (kind_of(inner),) if field.by_kind else ())
 
 
 def unknown_key(raw: Mapping[str, Any], place: Place, key: str, given: Mapping[str, Any], table: type) -> str:
@@ -175,4 +177,4 @@ def _nearest(path: str, keys: Mapping[str, CaseKey]) -> str | None:
 def _inside(table: str, keys: Mapping[str, CaseKey]) -> list[str]:
     """Names of the keys and tables directly inside a table; of the outermost tables for ""."""
     paths = [*keys, *case_tables()] if table else [*case_tables(), *keys]
-    return [name for outer, _, name in (path.rpartition(".") for path in paths) if outer == table]
+    return list(dict.fromkeys(name for outer, _, name in (path.rpartition(".") for path in paths) if outer == table))

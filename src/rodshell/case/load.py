@@ -8,7 +8,7 @@ from copy import deepcopy
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import partial
-from itertools import islice
+from itertools import islice, permutations
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from rodshell.case.keys import (
 from rodshell.case.stage_tables import IDLE
 from rodshell.errors import InputError
 from rodshell.quantities import Polylines, Unit
+from rodshell.rods.section import SectionKeys
 from rodshell.schema import read, value_of, written
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised, read_text
@@ -57,6 +58,12 @@ BUILT_IN: dict[str, _Raw] = {
 
 The pavilion is a shell to stand under: 12 m wide, of GFRP tubes that stay below their permanent design strength.
 """
+
+WORDED = tuple(path for path in case_keys() if path in case_tables())
+"""Tables that words may stand for."""
+
+INSTEAD = (("rod.material", "shear", "poisson_ratio"), *((path, "radius", "diameter") for path in WORDED))
+"""Of a table two keys of which only one can be given: one from an option goes before the other from the case."""
 
 BY_SUFFIX = dict.fromkeys((".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".json"), "mesh")
 BY_SUFFIX |= dict.fromkeys((".3dm", ".step", ".stp"), "nurbs")
@@ -192,6 +199,7 @@ def _validated(raw: _Raw, overrides: dict[str, object], files: Callable[[object]
     """The case of tables as they were read, with some keys changed."""
     _rename(raw, overrides)
     _read_loads(raw, overrides)
+    _read_words(raw, overrides)
     for path in case_tables():
         if not isinstance(_table(raw, path), dict):
             raise InputError(not_a_table(path, _table(raw, path)))
@@ -233,6 +241,22 @@ def _rename(raw: _Raw, overrides: dict[str, object]) -> None:
             _table(raw, new_table).setdefault(new_name, table.pop(old_name))
             if not table and old_table not in case_tables():
                 del raw[old_table]
+
+
+def _read_words(raw: _Raw, overrides: dict[str, object]) -> None:
+    """Put keys in the place of sections in words: rod = "tube 32x3" is rod.section = { kind = "tube", ... }."""
+    if isinstance(raw.get("rod"), str):
+        raw["rod"] = {"section": raw["rod"]}
+    if isinstance(overrides.get("rod"), str):
+        overrides.setdefault("rod.section", overrides.pop("rod"))
+    for path in WORDED:
+        table, _, name = path.rpartition(".")
+        inner = _found_table(raw, table)
+        if isinstance(inner.get(name), str):
+            inner[name] = dict(value_of(SectionKeys, path, inner[name]))
+        if isinstance(overrides.get(path), str):
+            for key, value in value_of(SectionKeys, path, overrides.pop(path)).items():
+                overrides.setdefault(f"{path}.{key}", value)
 
 
 _LOAD_TABLES = ("loads", "combinations", "bracing", "locked_joints", "stability", "strength")
@@ -320,9 +344,10 @@ def _drop_for_another_kind(raw: _Raw, overrides: Mapping[str, object]) -> None:
                     table.pop(key.name, None)
     if "rod.material.preset" in overrides:
         raw["rod"]["material"] = {}
-    for name, instead in (("shear", "poisson_ratio"), ("poisson_ratio", "shear")):
-        if overrides.get(f"rod.material.{name}") is not None and f"rod.material.{instead}" not in overrides:
-            _table(raw, "rod.material").pop(instead, None)
+    for table, *names in INSTEAD:
+        for name, instead in permutations(names):
+            if overrides.get(f"{table}.{name}") is not None and f"{table}.{instead}" not in overrides:
+                _found_table(raw, table).pop(instead, None)
     method = overrides.get("drape.method")
     if method is not None and method != raw["drape"].get("method", "bound"):
         for name in IDLE.get(str(method), ()):

@@ -8,7 +8,8 @@ from rodshell.case.held import Holding
 from rodshell.errors import InputError
 from rodshell.quantities import Length, LengthOrAuto
 from rodshell.rods.materials import Material
-from rodshell.rods.section import Circle, GivenSection, Rod, Section, Sized, Tube
+from rodshell.rods.section import IN_WORDS, SECTION_HELP, Circle, GivenSection, Rod, Section, Sized, Tube
+from rodshell.schema import Twice
 
 if TYPE_CHECKING:
     from rodshell.checks.sizing import Fit
@@ -29,7 +30,7 @@ class OpenCircle:
 
     kind: ClassVar = "circle"
     radius: Annotated[
-        LengthOrAuto, 'radius (of a tube: outer), or "auto": from the bends on the target'
+        LengthOrAuto, Twice("diameter"), 'radius (of a tube: outer), or "auto": from the bends on the target'
     ] = "auto"  # fmt: skip
 
 
@@ -38,7 +39,7 @@ class OpenTube:
     """A tube whose radius may be left to the target."""
 
     kind: ClassVar = "tube"
-    radius: Annotated[LengthOrAuto, "outer radius"] = "auto"
+    radius: Annotated[LengthOrAuto, Twice("diameter"), "outer radius"] = "auto"
     thickness: Annotated[Length, "thickness of the tube's wall"]
 
 
@@ -46,7 +47,9 @@ class OpenTube:
 class RodTable(Holding):
     """Section and material; what is left out, or "auto", is chosen to fit the target."""
 
-    section: AutoSection | OpenCircle | OpenTube | Sized | GivenSection = field(default_factory=AutoSection)
+    section: Annotated[
+        AutoSection | OpenCircle | OpenTube | Sized | GivenSection, IN_WORDS, SECTION_HELP
+    ] = field(default_factory=AutoSection)  # fmt: skip
     material: Material | None = None
 
     @classmethod

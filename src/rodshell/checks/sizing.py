@@ -380,7 +380,7 @@ def _of_depth(section: Section, deep: float, *, wall_stays: bool) -> Section:
     if deep < 2 * section.thickness:
         raise InputError(
             f"a wall of {length_text(section.thickness)}: tubes that withstand the bends of this shell are at most "
-            f"{length_text(deep)} thick: give a thinner wall, or the radius too"
+            f"{length_text(deep)} thick: give a thinner wall, or the diameter too"
         )
     return Tube(deep / 2, section.thickness)
 

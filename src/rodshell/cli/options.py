@@ -21,7 +21,7 @@ ALIASES = {path: f"--{path.partition('.')[2]}" for path in (
     "target.radius", "target.formula", "target.unit", "target.up", "target.base", "target.boundary",
     "layout.rods", "layout.spacing", "layout.length", "layout.edge", "layout.rotate",
     "drape.anchor", "drape.method", "drape.objective", "refine.vary",
-)}  # fmt: skip
+)} | {"rod.section": "--rod"}  # fmt: skip
 
 
 def _parameter(path: str) -> str:
@@ -113,6 +113,7 @@ class RunOptions:
     force: bool
     as_json: bool
     quiet: bool
+    verbose: bool
 
 
 _REPLACE = "Also replace files that rodshell did not write, or that were changed since."
@@ -136,8 +137,8 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
     """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
-        def with_output(*, out, only, time_limit, force, as_json, quiet, **values):  # type: ignore[no-untyped-def]
-            output = RunOptions(out, wanted_kinds(only), seconds_of(time_limit), force, as_json, quiet)
+        def with_output(*, out, only, time_limit, force, as_json, quiet, verbose, **values):  # type: ignore[no-untyped-def]
+            output = RunOptions(out, wanted_kinds(only), seconds_of(time_limit), force, as_json, quiet, verbose)
             return command(output=output, **values)
 
         found: Callable[..., Any] = wraps(command)(with_output)
@@ -148,6 +149,7 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
             FORCE,
             click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs."),
             QUIET,
+            click.option("--verbose", "-v", is_flag=True, help="Print all that was found, not the six lines alone."),
         )
         for option in reversed(options):
             found = option(found)

@@ -125,7 +125,7 @@ class Outcome:
 
     Args:
         status: "converged", or why not.
-        summary: one screen of text.
+        summary: six lines of text, or all that was found.
         content: what result.json holds.
         save: writes it into a folder.
         refused: why its loads could not be checked.
@@ -161,12 +161,14 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
         if refused and formed_before:
             raise InputError(refused)
         archive = form.archive()
-        if form.search is not None and not (output.quiet or output.as_json):
-            click.echo(form.search.table())
-        offer = "" if output.quiet or output.as_json else _offer(form, progress, in_time)
+        summary = archive.summary(verbose=output.verbose)
+        if output.verbose:
+            summary = "\n".join(
+                filter(None, [form.search and form.search.table(), summary, _offer(form, progress, in_time)])
+            )
         outcome = Outcome(
             archive.results.status,
-            f"{archive.summary()}\n  refine    {offer}" if offer else archive.summary(),
+            summary,
             archive.results.plain(),
             lambda folder: save(archive, folder, output.kinds, more=_pictures(form), progress=in_time),
             refused,
@@ -209,7 +211,7 @@ def _offer(form: "Form", progress: Progress, in_time: ProgressFunction) -> str:
 
     with progress:
         found = offer(form.stages, progress=in_time)
-    return "" if found is None else found.words
+    return "" if found is None else f"  refine    {found.words}"
 
 
 def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_json: bool, quiet: bool) -> int:
@@ -225,7 +227,7 @@ def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_j
         click.echo(json.dumps({"out": str(folder), **outcome.content}))
     elif not quiet:
         click.echo(outcome.summary.replace(FORM_AGAIN, again))
-        click.echo(f"written to {folder}")
+        say(f"written to {folder}")
     if outcome.refused:
         say(f"error: {outcome.refused}; the form is in {folder}, without its loads")
         return BAD_INPUT

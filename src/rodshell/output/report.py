@@ -306,7 +306,8 @@ def _with_strength(results: Results, columns: Sequence[str], title: str, values:
 def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]:
     """Groups of key figures; what is not known is left out."""
     rod, drape = results.rod, results.drape
-    parts: list[Record | None] = [rod.section, rod.material, rod] if rod else []
+    parts: list[Record | None] = [rod.material, rod] if rod else []
+    section = [("section", wording.section_text(rod.section))] if rod and rod.section else []
     preset = _listed(rod.preset if rod else None, _PRESET, plan.rounding)
     if by_design_strength(results):
         preset += _listed(results.strength, _DESIGN_STRENGTH, plan.rounding)
@@ -316,7 +317,7 @@ def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]
         ("Target", wording.case_rows(results.target, plan.rounding) + mesh),
         ("Layout", wording.case_rows(results.layout, plan.rounding)),
         ("Cut list", _cut_list(plan, results)),
-        ("Rod", [row for part in parts for row in wording.case_rows(part)] + preset),
+        ("Rod", section + [row for part in parts for row in wording.case_rows(part)] + preset),
         ("Net", _listed(results.net, _NET, plan.rounding)),
         ("Drape", _drape_rows(drape, plan.rounding) + deviation),
     ]

@@ -181,9 +181,9 @@ class Archive:
             f"{', '.join(shells_among(self.states)) or 'no shell in space'}>"
         )
 
-    def summary(self) -> str:
-        """One screen of text."""
-        return summary_text(self.results)
+    def summary(self, *, verbose: bool = False) -> str:
+        """Six lines of text; `verbose`: all that was found."""
+        return summary_text(self.results, verbose=verbose)
 
     @property
     def verdict(self) -> Verdict:

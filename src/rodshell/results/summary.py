@@ -1,29 +1,29 @@
-"""One screen of text about a result."""
+"""A result in six lines of text, and in full."""
 
-from collections.abc import Callable, Iterable, Iterator
-from math import degrees
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from math import degrees, isinf
 
-from rodshell.figures.checks import OTHER_SHAPES, Bending, SelfWeight
+from rodshell.figures.checks import OTHER_SHAPES, Bending, SelfWeight, WorstBent
 from rodshell.figures.form import Bent, RodType
 from rodshell.figures.loads import DesignStrength
 from rodshell.figures.records import printable
 from rodshell.results.judged.deployment import unknown_below
-from rodshell.results.judged.loads import UNLOADED, is_braced
+from rodshell.results.judged.loads import UNLOADED, is_braced, least_carried
 from rodshell.results.judged.shape import CONVERGED
 from rodshell.results.judged.stress import strength_name
-from rodshell.results.judged.supports import share_of_span
+from rodshell.results.judged.supports import share_of_span, width
 from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import thinner_than_sold
 from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import (
     NAMES,
-    case_rows,
     figure,
     percent,
     rounded,
     rounded_down,
     rounding_of,
+    section_text,
     share_of_weight,
     shown_factor,
     shown_length,
@@ -44,28 +44,100 @@ MOST_DROPPED = 6  # rods that are listed
 Length = Callable[[float | None], str]
 
 
-def summary_text(results: Results) -> str:
-    """What was found, how good it is, and what to read first."""
+def summary_text(results: Results, *, verbose: bool = False) -> str:
+    """Six lines: verdict, grid, rod, gap, stress, weight and snow; and what else was found, if `verbose`."""
     length, verdict = shown_length(results), verdict_of(results)
     said = [*_fallen(results, length), verdict.headline, *verdict.reasons[1:]]
-    lines = [f"{results.name or 'rodshell'}: {said[0]}", *(f"            {reason}" for reason in said[1:])]
+    more = " (there are more reasons: --verbose, or the report)" * (verdict.level != "good" and len(said) > 1)
     laths = f"; {lengths_text(results)}" if laths_text(results) else ""
-    lines.append(f"  grid      {len(results.rods)} rods, {_joints(results, length)}{laths}")
-    if results.rod:
-        lines += _rod(results.rod, results.bending, results.strength)
-    lines += _patches(results, length)
-    lines += _net_and_drape(results, length)
-    lines += _refinement(results)
-    lines += _pop_up(results, length)
-    lines += _bending(results, length)
-    lines += _weight_and_reactions(results, length)
-    lines += _edge_beams(results, length)
-    lines += _loads(results, length)
-    lines += _deployment(results)
-    lines += [f"  dropped   {rod.id}: {rod.reason}" for rod in results.dropped[:MOST_DROPPED]]
-    if len(results.dropped) > MOST_DROPPED:
-        lines.append(f"            and {len(results.dropped) - MOST_DROPPED} more, named in result.json")
+    lines = [
+        f"{results.name or 'rodshell'}: {said[0]}{'' if verbose else more}",
+        *(f"            {reason}" for reason in said[1:] if verbose),
+        f"  grid      {len(results.rods)} rods, {_joints(results, length)}{laths}{_extent(results, length)}",
+        *([f"  rod       {rod_text(results.rod)}"] if results.rod else []),
+        *_gap(results, length),
+        *_stress(results),
+        *_carried(results),
+        *(_details(results, length) if verbose else ()),
+    ]
     return "\n".join(map(printable, lines))
+
+
+def _extent(results: Results, length: Length) -> str:
+    """How wide the shell is, and how heavy."""
+    wide, mass = width(results), results.fabrication.total_mass if results.fabrication else None
+    return f"; {length(wide)} wide" * (wide > 0) + (f", {rounded(mass)} kg" if mass else "")
+
+
+def _gap(results: Results, length: Length) -> Iterator[str]:
+    """How near each shell comes to the target."""
+    gaps = results.agreement.items()
+    near = [f"{ends} {length(gap.max)} ({percent(gap.max_relative)} of its size)" for ends, gap in gaps]
+    yield from _line("gap", {"largest": near})
+
+
+def _stress(results: Results) -> Iterator[str]:
+    """Largest stress and utilisation of each shape, and utilisation under loads."""
+    said, known, unknown = dict[str, list[str]](), "", unknown_below(results)
+    for shape, bent in _shapes(results):
+        if bent.max_stress is None:
+            continue
+        text = f"{'while erected' if shape in STAGES else shape} {stress(bent.max_stress)}"
+        if bent.utilisation is not None:
+            strength = strength_name(results, shape)
+            text += f" ({percent(bent.utilisation)}" + f" of {strength}" * (strength != known) + ")"
+            known = strength
+        text += f", unknown below {whole_percent(unknown)} of it" * (shape in STAGES and unknown > 0)
+        said.setdefault("unloaded", []).append(text)
+    for name, ends, found in results.loaded_shells():
+        if found.utilisation is not None:
+            said.setdefault(name, []).append(f"{ends} {percent(found.utilisation)} of the strength")
+    yield from _line("stress", said)
+
+
+def _carried(results: Results) -> Iterator[str]:
+    """How much of its own weight and of the loads each shell carries, and how much snow."""
+    least = " (weakest patch, its seam held)" if results.patches else ""
+    weighed = results.self_weight.items()
+    said = {
+        f"own weight{' without bracing' * is_braced(results)}": [
+            f"{ends} {share_of_weight(found)}{least}" for ends, found in weighed
+        ],
+        "with bracing": [
+            f"{ends} {share_of_weight(SelfWeight(load_factor=found.braced_factor, limit=found.braced_limit))}"
+            for ends, found in weighed
+            if found.braced_limit is not None
+        ],
+        "even snow on top of it": [f"{ends} {snow_text(found)}" for ends, found in results.snow.items()],
+    }
+    for name, ends, loaded in results.loaded_shells():
+        factor, what = least_carried(loaded)
+        said.setdefault(name, []).append(f"{ends} {shown_factor(None if isinf(factor) else factor)} times {what}")
+    yield from _line("carries", said)
+
+
+def _line(label: str, said: Mapping[str, list[str]]) -> Iterator[str]:
+    """A line of the six, of what is known of each thing on each support."""
+    if known := [f"{what}: {', '.join(each)}" for what, each in said.items() if each]:
+        yield f"  {label:<10}{'; '.join(known)}"
+
+
+def _details(results: Results, length: Length) -> Iterator[str]:
+    """What else was found, of rods, net, equilibria, bends, loads and deployment."""
+    if results.rod:
+        yield from _rod(results.rod, results.bending, results.strength)
+    yield from _patches(results, length)
+    yield from _net_and_drape(results, length)
+    yield from _refinement(results)
+    yield from _pop_up(results, length)
+    yield from _bending(results, length)
+    yield from _deflection_and_reactions(results, length)
+    yield from _edge_beams(results, length)
+    yield from _loads(results, length)
+    yield from _deployment(results)
+    yield from (f"  dropped   {rod.id}: {rod.reason}" for rod in results.dropped[:MOST_DROPPED])
+    if len(results.dropped) > MOST_DROPPED:
+        yield f"            and {len(results.dropped) - MOST_DROPPED} more, named in result.json"
 
 
 def chosen(parts: Iterable[str]) -> str:
@@ -76,7 +148,7 @@ def chosen(parts: Iterable[str]) -> str:
 
 def rod_text(rod: RodType) -> str:
     """Section and material in a few words, and whether it is the paper's rubber."""
-    line = ", ".join(" ".join(row) for row in case_rows(rod.section)).removeprefix("kind ")
+    line = section_text(rod.section)
     material = rod.material
     if material is None:
         return line
@@ -103,14 +175,13 @@ def rod_text(rod: RodType) -> str:
 
 
 def _rod(rod: RodType, bending: Bending | None, judged_by: DesignStrength | None) -> Iterator[str]:
-    """Section and material in a line; what is known of a preset, and what the program chose, in further lines."""
-    yield f"  rod       {rod_text(rod)}"
+    """What the program chose of it and how, and what is known of its material."""
     if rod.chosen:
         reached = _reached(bending) if "section" in rod.chosen else ""
         thin = thinner_than_sold(rod)
-        yield f"            {chosen(rod.chosen)}{reached}{thin and '; '}{thin}"
+        yield f"  chosen    {chosen(rod.chosen)}{reached}{thin and '; '}{thin}"
     if rod.preset:
-        line = f"            {rod.preset.name}: {rod.preset.grade}"
+        line = f"  material  {rod.preset.name}: {rod.preset.grade}"
         if rod.preset.bending_strength is not None:
             line += f"; bending strength {stress(rod.preset.bending_strength)}, {rod.preset.strength_note}"
         yield line
@@ -210,30 +281,29 @@ def _pop_up(results: Results, length: Length) -> Iterator[str]:
             state += ", NOT STABLE" if shell.stable is False else ", stability not checked"
         line = f"  pop-up    {ends:<8}{state}, {shell.factorizations} factorisations"
         if gap := results.agreement.get(ends):
-            line += f"; gap max {length(gap.max)} ({percent(gap.max_relative)}), "
-            line += f"rms {length(gap.rms)} ({percent(gap.rms_relative)})"
+            line += f"; gap rms {length(gap.rms)} ({percent(gap.rms_relative)})"
         yield line
 
 
-def _bending(results: Results, length: Length) -> Iterator[str]:
-    """Bending, stress and utilisation, a line for each shape."""
+def _shapes(results: Results) -> Iterator[tuple[str, WorstBent]]:
+    """The bends of each shape, and those while it is erected."""
     bending, unknown = results.bending, unknown_below(results)
     if bending is None or (results.target and results.target.flat):
         return
     for shape, bent in bending.shapes().items():
         if (shape == "pop_up" and bending.deployment) or (shape in STAGES and unknown >= 1) or bent.min_radius is None:
             continue  # the first is the deployment with the final shape
+        yield shape, bent
+
+
+def _bending(results: Results, length: Length) -> Iterator[str]:
+    """Bends and torsion, a line for each shape."""
+    for shape, bent in _shapes(results):
         name = "stages" if shape in STAGES else shape
         line = f"  bending   {name:<8}smallest radius {length(bent.min_radius)}{_curved(bent, length)}"
-        if bent.max_stress is not None:
-            line += f", largest stress {stress(bent.max_stress)} unloaded"
         if bent.torsion_stress:
-            line += f" (torsion alone {stress(bent.torsion_stress)})"
-        if bent.utilisation is not None:
-            line += f", {percent(bent.utilisation)} of {strength_name(results, shape)}"
-            if results.strength is not None and results.strength.hole:
-                line += ", holes at joints counted"
-        yield line + (f"; unknown below {whole_percent(unknown)} of it" if shape in STAGES and unknown else "")
+            line += f", stress of torsion alone {stress(bent.torsion_stress)}"
+        yield line + ", holes at joints counted" * bool(results.strength and results.strength.hole)
 
 
 def _curved(bent: Bent, length: Length) -> str:
@@ -260,20 +330,11 @@ def _joints(results: Results, length: Length) -> str:
     return f"{joints}, none at {where}; longest span from an end to a joint {length(far)} ({name})"
 
 
-def _weight_and_reactions(results: Results, length: Length) -> Iterator[str]:
-    """How much of its own weight the shell carries, and the forces at its supports."""
-    least = " (weakest patch, its seam held)" if results.patches else ""
-    what = f"own weight carried{' without bracing' * is_braced(results)}"
+def _deflection_and_reactions(results: Results, length: Length) -> Iterator[str]:
+    """How far the shell moves under its own weight, and the forces at its supports."""
     for ends, weighed in results.self_weight.items():
-        line = f"  weight    {ends:<8}{what}: {share_of_weight(weighed)}{least}"
         if weighed.deflection is not None:
-            line += f"; deflection under it: {length(weighed.deflection)}"
-        if ends in results.snow:
-            line += f"; even snow on top of it: {snow_text(results.snow[ends])}"
-        if weighed.braced_limit is not None:
-            braced = SelfWeight(load_factor=weighed.braced_factor, limit=weighed.braced_limit)
-            line += f"; with bracing: {share_of_weight(braced)}"
-        yield line
+            yield f"  weight    {ends:<8}deflection under it: {length(weighed.deflection)}"
     for ends, held in results.reactions.items():
         sums = f"forces {small(held.force_imbalance)}, moments {small(held.moment_imbalance)} of the largest"
         yield f"  reactions {ends:<8}largest {rounded(held.largest_force or 0.0)} N unloaded; sums of {sums}"

@@ -7,9 +7,13 @@ from functools import cached_property
 from math import ceil, floor, isfinite, log10, pi
 from typing import Any
 
+from rodshell.errors import InputError
 from rodshell.figures.checks import SelfWeight
+from rodshell.figures.form import Section
 from rodshell.figures.records import Record
 from rodshell.results.results import Results
+from rodshell.rods.section import SHAPES, size_text
+from rodshell.schema import read
 from rodshell.units import percent_text, stress_text
 
 FINEST, COARSEST = 1e-3, 1.0  # mm
@@ -215,6 +219,18 @@ def yes_or_no(value: object) -> str:
 def plain(value: object) -> str:
     """A value of which no more is known than that it was recorded."""
     return UNKNOWN if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def section_text(section: Section | None) -> str:
+    """A rod's section as a supplier calls it: "tube 32 x 3 mm"; where its stiffnesses alone are known, these."""
+    keys = section.plain() if section else {}
+    shape = SHAPES.get(keys.get("kind", ""))
+    try:
+        if shape:
+            return size_text(read(shape, keys))
+    except InputError:  # of an archive that was changed
+        pass
+    return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in case_rows(section))
 
 
 def case_rows(table: Record | None, rounding: Rounding = EXACT) -> list[tuple[str, str]]:

@@ -2,8 +2,11 @@
 
 A section has two axes, those of the material directors m1 and m2. The second moments (I1, I2) resist bends
 *towards* m1 and m2: I1 is the integral of the square of the coordinate along m1.
+
+`section_from` and `section_keys` read a section as a supplier calls it, and `size_text` writes it: "tube 32 x 3 mm".
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,13 +23,13 @@ from rodshell.quantities import (
     MassPerLength,
     SectionModulus,
     Stress,
+    Value,
 )
 from rodshell.rods.materials import Material as Material
 from rodshell.rods.materials import PresetName
-from rodshell.schema import Table, checked, written
+from rodshell.schema import Table, Twice, checked, read, value_of, written
+from rodshell.units import length_text, read_quantity
 from rodshell.validation import brief, instance
-
-MM = 1e-3
 
 
 class _Shape:
@@ -103,7 +106,7 @@ class Circle(_Round):
     """Solid circular section."""
 
     kind: ClassVar = "circle"
-    radius: Annotated[Length, "radius (of a tube: outer)"]
+    radius: Annotated[Length, Twice("diameter"), "radius (of a tube: outer)"]
 
     def __post_init__(self) -> None:
         checked(self, "section {}")
@@ -115,13 +118,16 @@ class Tube(_Round):
 
     kind: ClassVar = "tube"
     shear_peak: ClassVar = 2.0
-    radius: Annotated[Length, "outer radius"]
+    radius: Annotated[Length, Twice("diameter"), "outer radius"]
     thickness: Annotated[Length, "thickness of the tube's wall"]
 
     def __post_init__(self) -> None:
         checked(self, "section {}")
         if self.thickness > self.radius:
-            raise InputError(f"tube thickness {self.thickness} m is larger than its radius {self.radius} m")
+            raise InputError(
+                f"a tube's wall of {length_text(self.thickness)} is thicker than half of its diameter, "
+                f'{length_text(2 * self.radius)}: give the diameter and then the wall, such as "tube 32x3"'
+            )
 
     @property
     def inner_radius(self) -> float:
@@ -242,6 +248,85 @@ Section = Circle | Tube | Sized
 SECTIONS = "a circle, tube, ellipse, rectangular or given section"
 
 
+# In words
+
+_MEASURES = {
+    "rod": ("rod 12", "the diameter"),
+    "tube": ("tube 32x3", "the outer diameter and the wall"),
+    "lath": ("lath 12x40", "the thickness and the breadth"),
+    "strip": ("strip 2x40", "the thickness and the height"),
+    "ellipse": ("ellipse 20x30", "the width across the grid and that within it"),
+}
+"""What sections are called: an example, and the measures that follow the name."""
+
+
+def section_keys(words: object) -> Table:
+    """The keys of a section in words, in SI; measures are in mm unless a unit is written.
+
+    Raises:
+        ValueError: it is not understood; with the reason.
+    """
+    name, given = next(iter(re.findall(r"^\s*([a-z]+)\s*(.*)", str(words), re.I)), ("", ""))
+    example, measures = _MEASURES.get(name.lower(), ("", ""))
+    if not example:
+        known = ", ".join(f'"{known}"' for known, _ in _MEASURES.values())
+        raise ValueError(f"give a section with its measures in mm, such as {known}")
+    parts = [part.strip() for part in re.split("[x\N{MULTIPLICATION SIGN}]", given)]
+    wanted = f'after "{name}" comes {measures}, in mm unless a unit is written: "{example}"'
+    if len(parts) != example.count("x") + 1 or not all(parts):
+        raise ValueError(wanted)
+    unit = parts[-1].lstrip("+-.0123456789e ") or "mm"  # also of those before that have none
+    sizes = [f"{part} {unit}" if part[-1] in ".0123456789" else part for part in parts]
+    try:
+        first, second = (read_quantity(size, "length", size=True) for size in (*sizes, sizes[-1])[:2])
+    except ValueError as reason:
+        raise ValueError(f"{str(reason).partition(';')[0]}; {wanted}") from None
+    thin, wide = sorted((first, second))
+    match name.lower():
+        case "rod":
+            return {"kind": Circle.kind, "radius": first / 2}
+        case "tube":
+            return {"kind": Tube.kind, "radius": first / 2, "thickness": second}
+        case "ellipse":
+            return {"kind": Ellipse.kind, "a": first / 2, "b": second / 2}
+        case "lath":
+            return {"kind": RectangularSection.kind, "width": thin, "height": wide}
+    return {"kind": RectangularSection.kind, "width": wide, "height": thin}
+
+
+IN_WORDS = Value(section_keys)
+"""Mark of a section that words may stand for."""
+SHAPES: dict[str, type[Section]] = {shape.kind: shape for shape in (Circle, Tube, Ellipse, RectangularSection)}
+SectionKeys = Annotated[Table, IN_WORDS]
+SECTION_HELP = 'in words, in mm: "rod 12", "tube 32x3", "lath 12x40", "strip 2x40"'
+
+
+def section_from(words: str) -> Section:
+    """A section as a supplier calls it, in mm unless a unit is written: "rod 12", "tube 32x3", "lath 12x40" (it lies
+    flat), "strip 2x40" (it stands upright), "ellipse 20x30" (across the grid, within it).
+
+    Raises:
+        InputError: it is not understood, or there is no such section.
+    """
+    keys = value_of(SectionKeys, "section", words)
+    return read(SHAPES[keys["kind"]], keys)
+
+
+def size_text(section: Section) -> str:
+    """A section in the words that `section_from` reads: "tube 32 x 3 mm"."""
+    if isinstance(section, RectangularSection):
+        name, measures = "lath", (section.width, section.height)
+        if section.width > section.height:
+            name, measures = "strip", (section.height, section.width)
+    elif isinstance(section, Ellipse):
+        name, measures = "ellipse", (2 * section.a, 2 * section.b)
+    elif isinstance(section, Tube):
+        name, measures = "tube", (2 * section.radius, section.thickness)
+    else:
+        return f"rod {2e3 * section.radius:g} mm"
+    return f"{name} {' x '.join(f'{1e3 * measure:g}' for measure in measures)} mm"
+
+
 @dataclass(frozen=True)
 class Rod:
     """One kind of rod; its section and material give the stiffnesses of HQK Eq 1.
@@ -254,7 +339,7 @@ class Rod:
         InputError: section or material are something else, or exclude each other.
     """
 
-    section: Annotated[Section | GivenSection, "section and material"]
+    section: Annotated[Section | GivenSection, IN_WORDS, SECTION_HELP]
     material: Material | None = None
 
     __repr__ = brief
@@ -346,17 +431,17 @@ def scaled(section: Section, factor: float) -> Section:
 
 
 def _rods(*diameters: float) -> tuple[Section, ...]:
-    return tuple(Circle(d / 2 * MM) for d in diameters)
+    return tuple(Circle(d / 2e3) for d in diameters)
 
 
 def _tubes(*sizes: tuple[float, float]) -> tuple[Section, ...]:
     """Outer diameter and wall [mm]."""
-    return tuple(Tube(d / 2 * MM, wall * MM) for d, wall in sizes)
+    return tuple(Tube(d / 2e3, wall / 1e3) for d, wall in sizes)
 
 
 def _laths(*sizes: tuple[float, float]) -> tuple[Section, ...]:
     """Thickness and breadth [mm] of laths that lie flat."""
-    return tuple(RectangularSection(width=thickness * MM, height=breadth * MM) for thickness, breadth in sizes)
+    return tuple(RectangularSection(width=thickness / 1e3, height=breadth / 1e3) for thickness, breadth in sizes)
 
 
 _TIMBER = _laths(
@@ -393,12 +478,3 @@ TRADE_SIZES: dict[PresetName, tuple[Section, ...]] = {
     "rubber": (),
 }
 """Sections in which each preset material is usually sold, thin ones first; what a supplier has may differ."""
-
-
-def size_text(section: Section) -> str:
-    """A size in trade as a supplier names it [mm]: 8 x 20 mm, a rod of 12 mm, a tube of 20 x 3 mm."""
-    if isinstance(section, RectangularSection):
-        return f"{section.width / MM:g} x {section.height / MM:g} mm"
-    if isinstance(section, Tube):
-        return f"a tube of {2 * section.radius / MM:g} x {section.thickness / MM:g} mm"
-    return f"a rod of {section.depth / MM:g} mm"

@@ -25,7 +25,7 @@ from rodshell.results import Archive
 from rodshell.results.archive import input_hash
 from rodshell.results.results import Drawings
 from rodshell.results.verdict import verdict_of
-from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, rounding_of, stress
+from rodshell.results.wording import joint_rows, nice_step, rounded, rounding_of, section_text, stress
 
 NOTE = "Design aid, not code compliance"
 _NOT_GIVEN = "not given"
@@ -84,7 +84,7 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
         ("Drawn by", given.author or _NOT_GIVEN),
         ("Date", given.date or (source_date() or datetime.now(UTC)).date().isoformat()),
         ("Revision", given.revision or "-"),
-        ("Section", _in_words(case_rows(rod.section)) or _NOT_GIVEN),
+        ("Section", section_text(rod.section) or _NOT_GIVEN),
         ("Material", _material(rod.material) or _NOT_GIVEN),
         ("Joints", _in_words(joint_rows(results.joint)) or "ball"),
         ("Rods", f"{len(results.rods)}"),
@@ -107,7 +107,7 @@ def source_date() -> datetime | None:
 
 
 def _in_words(rows: Iterable[tuple[str, str]]) -> str:
-    """ "circle, radius 1 mm"."""
+    """ "pin, eccentricity 4 mm"."""
     return ", ".join(value if key == "kind" else f"{key} {value}" for key, value in rows)
 
 

@@ -18,7 +18,6 @@ from rodshell.results.results import Results
 from rodshell.results.sizes_sold import half_sides, sizes_sold
 from rodshell.results.wording import FORM_AGAIN, part_of_weight, percent, rounded, rounded_down, shown_factor
 from rodshell.rods.section import Section, size_text
-from rodshell.schema import written
 
 WITHOUT_STIFFNESS = ("ball", "pin", "rigid")  # joints
 NOT_KNOWN = ("not followed", "no mass", None)  # limits of which no factor follows
@@ -210,15 +209,7 @@ def _too_sharp(results: Results, rod: RodType, sold: Sequence[Section], factors:
 
 def _again(results: Results, section: Section) -> tuple[str, ...]:
     """The command that forms the shell with another section; none without a target."""
-    if results.target is None:
-        return ()
-    now = results.rod.section.kind if results.rod and results.rod.section else None
-    lengths = {
-        key: f'"{rounded(1e3 * value, 4)} mm"' for key, value in written(section).items() if isinstance(value, float)
-    }
-    kind = {} if written(section)["kind"] == now else {"kind": written(section)["kind"]}
-    words = " ".join(f"--rod.section.{key} {value}" for key, value in (kind | lengths).items())
-    return (f"{FORM_AGAIN} {words}",)
+    return () if results.target is None else (f'{FORM_AGAIN} --rod "{size_text(section)}"',)
 
 
 def _gain(rod: RodType, section: Section) -> float:

@@ -25,7 +25,7 @@ const SLIDERS = [  // key, name, and how its range follows from its value
   ["target.b", "Half-axis y", "length"], ["target.c", "Half-axis z", "length"], ["target.base", "Base plane", "place"],
   ["target.scale", "Scale", "factor"],
 ];
-const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["rod.material.preset", "Material"], ["drape.method", "Drape"]];
+const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["rod.section", "Section"], ["rod.material.preset", "Material"], ["drape.method", "Drape"]];
 const TIMEOUT = 1500;  // ms after which a lost connection is tried again
 const TABS = 1000;  // serials modulo TABS tell which tab sent a case: the server numbers its pages
 const mine = number => number % TABS === tab;
@@ -433,7 +433,7 @@ function range(path, now, wanted) {
 function addKey(folder, key, label = "") {
   if (!key) return;
   const raw = get(base, key.path);
-  const text = raw === undefined ? "" : typeof raw === "string" ? raw : JSON.stringify(raw);
+  const text = raw === undefined || isTable(raw) ? "" : typeof raw === "string" ? raw : JSON.stringify(raw);
   const holder = { value: text };
   const name = label || key.path.split(".").slice(1).join(".");
   const given = get(resolved, key.path), shownAs = Array.isArray(given) ? given.join(", ") : String(given ?? "default");
@@ -450,7 +450,7 @@ function addKey(folder, key, label = "") {
     if (key.path.endsWith("kind")) setTimeout(buildControls);
   });
   const input = controller.domElement.querySelector("input");
-  if (input && given !== undefined) input.placeholder = typeof given === "number" ? String(Number(given.toPrecision(6))) : String(given);
+  if (input && given !== undefined) input.placeholder = isTable(given) ? "such as tube 32x3" : typeof given === "number" ? String(Number(given.toPrecision(6))) : String(given);
   describe(controller, key.path, key.help);
 }
 
