@@ -164,7 +164,7 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
         summary = archive.summary(verbose=output.verbose)
         if output.verbose:
             summary = "\n".join(
-                filter(None, [form.search and form.search.table(), summary, _offer(form, progress, in_time)])
+                filter(None, [form.search.table() if form.search else "", summary, _offer(form, progress, in_time)])
             )
         outcome = Outcome(
             archive.results.status,
