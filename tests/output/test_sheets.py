@@ -241,6 +241,13 @@ def test_the_table_of_supports_says_how_the_ends_are_held() -> None:
     assert not titled(small(*ENDS), "Supports, pinned")
 
 
+def test_every_sheet_says_which_supports_its_shape_is_of() -> None:
+    held = {"pinned": "pinned ends (free to turn)", "clamped": "clamped ends (directions held)"}
+    for ends, words in held.items():
+        for sheet in sheets(small(ends)):
+            assert {text.text for text in sheet.texts} >= {"Supports", words}, sheet.title
+
+
 def test_tables_of_a_shell_that_is_only_draped_name_no_ends() -> None:
     sample = sample_archive(3, 2)
     states = {name: state for name, state in sample.states.items() if "pinned" not in name and "clamped" not in name}

@@ -19,11 +19,13 @@ from rodshell.figures.form import Material, RodType
 from rodshell.figures.records import json_text
 from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
+from rodshell.output.grid import supported
 from rodshell.output.labels import Label, Room, closed_segments, nearby, segments, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash
 from rodshell.results.results import Drawings
+from rodshell.results.states import DRAPED
 from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import case_rows, joint_rows, nice_step, rounded, rounding_of, stress
 
@@ -87,7 +89,7 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
         ("Section", _in_words(case_rows(rod.section)) or _NOT_GIVEN),
         ("Material", _material(rod.material) or _NOT_GIVEN),
         ("Joints", _in_words(joint_rows(results.joint)) or "ball"),
-        ("Rods", f"{len(results.rods)}"),
+        ("Supports", supported(final) if (final := archive.final or DRAPED) != DRAPED else "none, as draped"),
         ("Units", f"mm, shown to {rounding_of(results).words}"),
         ("Tolerance", _NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
         ("Input", input_hash(source, archive.inputs)),
