@@ -361,6 +361,27 @@ def test_strips_tell_each_distance_with_the_rod_that_is_met_there() -> None:
     assert sorted(text for text in texts if text[-3:-2] in "UV") == sorted(told)
 
 
+def test_equal_rods_are_one_strip_on_sheets_and_each_has_its_own_in_the_file_for_the_saw() -> None:
+    """Each half of a dome mirrors the other: a rod and its mirror image meet the same rods at the same distances."""
+    made = archive("dome")
+    plan = flat_plan(made)
+    strips = [text.text for sheet in sheet_set(made)[0] if sheet.title.startswith("Rod strips") for text in sheet.texts]
+    heads = [text.partition("   ")[0] for text in strips if "   cut " in text]
+    groups = [re.findall("[UV][0-9]+", head) for head in heads]
+    assert sorted(rod for ids in groups for rod in ids) == sorted(rod.id for rod in plan.rods)
+    assert len(groups) == len(plan.rods) / 2 + 1  # the middle rod of each family is alone
+    assert {head for head in heads if head[0] in "UV"} == {"U11", "V11"}
+    assert all(head.startswith(f"{len(ids)} \N{MULTIPLICATION SIGN} ") for head, ids in zip(heads, groups, strict=True)
+               if len(ids) > 1)  # fmt: skip
+    rods = {rod.id: rod for rod in plan.rods}
+    for first, *others in groups:
+        for other in others:
+            assert rods[other].cut_length == pytest.approx(rods[first].cut_length, abs=1e-4)
+            assert dict(rods[other].joints) == pytest.approx(dict(rods[first].joints), abs=1e-4)
+    alone = [text.text for text in strips_drawing(plan, plan.text).texts if "   cut " in text.text]
+    assert [text.partition("   ")[0] for text in alone] == [rod.id for rod in plan.rods]
+
+
 def test_all_that_the_workshop_reads_measures_from_the_cut_end(tmp_path: Path) -> None:
     """Strips, both schedules, the PDF's tables and the pieces of stock: 12 mm of allowance before the rod's start."""
     made = wished()

@@ -219,16 +219,32 @@ def figures(made: Archive, table: str) -> set[str]:
     return {rounding_of(made.results).mm(brace.final) for brace in fabricated.bracing}
 
 
+def braced(*ends: Ends) -> Archive:
+    """The same dome, its diagonals laths as the case has them."""
+    return replace(small(*ends), case_toml='[bracing]\nkind = "laths"\n')
+
+
+def test_only_shells_with_bracing_have_sheets_of_it() -> None:
+    """Of cables the lengths to cut are known; the files at 1:1 have the diagonals of every shell."""
+    plain = small("pinned").results.plain()
+    for brace in plain["fabrication"]["bracing"]:
+        brace["cut"] = brace["final"] / 1.0005
+    cables = replace(small("pinned"), results=Results.of(plain))
+    assert "bracing" in drawing_set(small("pinned"))
+    for made, has in ((small("pinned"), False), (braced("pinned"), True), (cables, True)):
+        assert any(sheet.title.startswith("Bracing") for sheet in sheets(made)) == has
+
+
 @pytest.mark.parametrize("table", ["Rods", "Bracing"])
 def test_tables_of_the_final_shape_say_with_which_ends_it_is(table: str) -> None:
     """A shell popped up with both ends has the table of the one that its title names: here of the clamped one."""
     named = {ends: f"{table}, final shape with {ends} ends" for ends in ENDS}
     for ends, other in (ENDS, ENDS[::-1]):
-        assert titled(small(ends), named[ends])
-        assert not titled(small(ends), named[other])
-    both = [ends for ends in ENDS if titled(small(*ENDS), named[ends])]
+        assert titled(braced(ends), named[ends])
+        assert not titled(braced(ends), named[other])
+    both = [ends for ends in ENDS if titled(braced(*ENDS), named[ends])]
     assert both == ["clamped"]
-    shown, of = set(cells(titled(small(*ENDS), table))), {ends: figures(small(ends), table) for ends in ENDS}
+    shown, of = set(cells(titled(braced(*ENDS), table))), {ends: figures(small(ends), table) for ends in ENDS}
     assert of["clamped"] <= shown
     assert not of["pinned"] - of["clamped"] <= shown
 
@@ -239,6 +255,13 @@ def test_the_table_of_supports_says_how_the_ends_are_held() -> None:
         assert titled(small(ends), f"Supports, {words}")
     assert titled(small(*ENDS), "Supports, clamped ends (directions held)")
     assert not titled(small(*ENDS), "Supports, pinned")
+
+
+def test_every_sheet_says_which_supports_its_shape_is_of() -> None:
+    held = {"pinned": "pinned ends (free to turn)", "clamped": "clamped ends (directions held)"}
+    for ends, words in held.items():
+        for sheet in sheets(small(ends)):
+            assert {text.text for text in sheet.texts} >= {"Supports", words}, sheet.title
 
 
 def test_tables_of_a_shell_that_is_only_draped_name_no_ends() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from rodshell.geometry.boxes import lines_meet
-from rodshell.output.colour_scale import mixed, scale_of
+from rodshell.output.colour_scale import ABOVE, BINS, mixed, scale_of
 from rodshell.output.drawing import BELOW, LETTER, LINE, Drawing, Mark, Path, Pen, Pencil, Text
 from rodshell.output.grid import rods_of, shape_of
 from rodshell.output.labels import Room
@@ -218,8 +218,28 @@ def test_utilisation_says_by_which_strength_it_is_counted() -> None:
             scale = scale_of(archive, shape, "stress")
             assert scale is not None
             largest = 100 * shape.known["stress"].max() / strength
-            assert scale.caption == f"utilisation in %{which}, here up to {largest:.3g}"
+            said_above = ", above 100 in magenta" if scale.above else ""
+            assert scale.caption == f"utilisation in %{which}, here up to {largest:.3g}{said_above}"
             assert scale.values.max() == pytest.approx(largest)
+
+
+def test_colours_end_at_all_of_the_strength_and_what_is_above_has_its_own() -> None:
+    dome = archive_of("dome")
+    shape, bending = shape_of(dome, "popped_pinned"), dome.results.bending
+    assert bending is not None
+    stress = shape.known["stress"]
+    for share in (0.5, 1.7):
+        strength = float(stress.max()) / share
+        known = bending.model_copy(update={"strength": strength, "erection_strength": 1e3 * strength})
+        scale = scale_of(replace(dome, results=dome.results.model_copy(update={"bending": known})), shape, "stress")
+        assert scale is not None
+        over = stress > strength
+        assert scale.high == 100 if share > 1 else scale.high <= 100
+        assert len(scale.palette) == BINS
+        assert np.any(over) == (share > 1)
+        assert np.array_equal(scale.bins == BINS - 1, over) or share < 1
+        assert (scale.palette[-1] == ABOVE) == (share > 1)
+        assert ABOVE not in scale.palette[:-1]
 
 
 @pytest.mark.parametrize(("gap", "unit", "high"), [(3.3e-5, "mm", 0.04), (0.8, "mm", 800.0), (2.4, "m", 3.0)])

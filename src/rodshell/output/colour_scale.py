@@ -1,9 +1,9 @@
 """Colours that stand for numbers: of rods in a picture (gap, stress, height), and of the trials of a search."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import degrees
+from math import degrees, inf
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -29,6 +29,7 @@ SIGNED = ("#39b5e6", "#2f86b4", "#2f5a7a", "#333b46", "#7c4a35", "#bf6434", "#f2
 STRESS = ("#2b3a55", "#3f6f8f", "#6fa287", "#c9b458", "#dd8a3a", "#b3372c")
 HEIGHT = ("#352a6b", "#33508a", "#24768e", "#26988a", "#4cb873", "#9bc94f")
 BINS = 33  # colours in use; odd, so that a gap of 0 has its own
+ABOVE = "#e0007a"  # of utilisations above 100 %
 STAGES = "history_stress"
 FINEST = 1e-3  # mm; smaller gaps are drawn like none
 
@@ -42,6 +43,7 @@ class Scale:
         low, high: values at both ends of the map.
         colours: control points of the map, evenly spaced, "#rrggbb".
         caption: what the values are, with their unit.
+        above: colour "#rrggbb" of values above `high`, the last of the palette; "": there are none.
     """
 
     values: Floats
@@ -49,16 +51,21 @@ class Scale:
     high: float
     colours: tuple[str, ...]
     caption: str
+    above: str = ""
 
     @property
     def bins(self) -> Ints:
         """(k,) index in the palette of each value's colour."""
         share = np.nan_to_num((self.values - self.low) / (self.high - self.low), nan=0.5)
-        return np.rint(np.clip(share, 0, 1) * (BINS - 1)).astype(np.intp)
+        last = BINS - 1 - bool(self.above)
+        found = np.rint(np.clip(share, 0, 1) * last).astype(np.intp)
+        return np.where(share > 1, BINS - 1, found)
 
     @property
     def palette(self) -> list[str]:
         """Colours "#rrggbb" of all bins."""
+        if self.above:
+            return [*hex_colours(self.colours, np.linspace(0, 1, BINS - 1)), self.above]
         return hex_colours(self.colours, np.linspace(0, 1, BINS))
 
 
@@ -121,16 +128,19 @@ def _stress_scale(archive: Archive, shape: Shape, stress: Floats) -> Scale:
     erection = (bending.erection_strength if bending else None) or strength
     known = [(name, float(np.max(values))) for name, values in _of_all_shapes(archive, "stress")]
     if strength and erection:
-        unit, caption = (strength if final else erection) / 100, "utilisation in %"
+        unit, caption, full = (strength if final else erection) / 100, "utilisation in %", 100.0
         if strength != erection:
             caption += ", permanent" if final else ", erection"
         top = max(100 * largest / (erection if name == STAGES else strength) for name, largest in known)
     else:
-        top = max(largest for _, largest in known)
+        top, full = max(largest for _, largest in known), inf
         unit, name = next((entry for entry in PRESSURES if top >= entry[0]), PRESSURES[-1])
         caption, top = f"stress in {name}", top / unit
     values = stress / unit
-    return _scale(values, max(top, FINEST), STRESS, f"{caption}, here up to {float(np.max(values)):.3g}")
+    caption += f", here up to {float(np.max(values)):.3g}"
+    if top > full:
+        return replace(_scale(values, full, STRESS, f"{caption}, above {full:.0f} in magenta"), above=ABOVE)
+    return _scale(values, max(top, FINEST), STRESS, caption)
 
 
 def _curvature_scale(archive: Archive, _: Shape, curvature: Floats) -> Scale:

@@ -8,6 +8,7 @@ import base64
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -17,7 +18,7 @@ from rodshell.figures.form import Agreement, Drape, Gate, PopUp
 from rodshell.figures.records import Ends, Record
 from rodshell.output.drawings import drawing_set, drawing_svgs
 from rodshell.output.drawings.flat import FlatPlan, flat_plan
-from rodshell.output.drawings.sheets import NOTE, TRUE_SIZE
+from rodshell.output.drawings.sheets import NOT_GIVEN, NOTE, TRUE_SIZE, title_block
 from rodshell.output.grid import caption_of, shape_names
 from rodshell.output.loads_page import loads_page
 from rodshell.output.pictures import picture_svg
@@ -66,6 +67,7 @@ def report_html(archive: Archive) -> str:
     return environment.get_template("report.html.j2").render(
         name=archive.name,
         note=NOTE,
+        size=size_text(archive),
         summary=plan.summary,
         verdict=archive.verdict,
         facts=facts(results),
@@ -91,6 +93,18 @@ def report_html(archive: Archive) -> str:
         versions=", ".join(f"{name} {number}" for name, number in (results.versions or {}).items()),
         format_version=results.version,
     )
+
+
+def size_text(archive: Archive) -> str:
+    """The final shell in one line: its plan and height, what rods and joints weigh, section and supports."""
+    known, words = dict(title_block(archive, "").entries), list[str]()
+    if archive.final is not None:
+        across, along, height = (wording.rounded(size, 3) for size in np.ptp(archive.states[archive.final], axis=0))
+        words.append(f"{across} x {along} m in plan, {height} m high")
+    if (made := archive.results.fabrication) and made.total_mass is not None:
+        words.append(f"{wording.rounded(made.total_mass, 3)} kg")
+    words += [known["Section"]] if known["Section"] != NOT_GIVEN else []
+    return ", ".join([*words, known["Supports"]])
 
 
 def _on_page(svg: str) -> str:

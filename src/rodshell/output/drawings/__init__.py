@@ -1,5 +1,6 @@
 """The drawing set: each drawing laid out once, at 1:1 for DXF and SVG, all of them on sheets for the PDF."""
 
+import tomllib
 from collections.abc import Iterator
 from functools import partial
 
@@ -46,6 +47,8 @@ def drawing_svgs(archive: Archive) -> dict[str, str]:
 def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
     """All sheets in mm of paper, and the paper's size."""
     plan, paper, layouts = flat_plan(archive), _paper(archive), dict(_layouts(archive))
+    if not _braced(archive):
+        layouts.pop("bracing", None)
     checked = _checked(archive.results)
     about = {"supports": _held(archive), "bracing": checked, "rods": checked}
 
@@ -63,6 +66,14 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
         if SCHEDULES[name].known(archive):
             found += listed(name)
     return sheets.bound(found, sheets.title_block(archive, plan.summary), paper), paper
+
+
+def _braced(archive: Archive) -> bool:
+    """Whether the shell has bracing; the diagonals of every shell are in the files at 1:1 and in the schedule."""
+    results = archive.results
+    asked = tomllib.loads(archive.case_toml).get("bracing", {}).get("kind", "none") != "none"
+    loaded = any(shell.bracing for _, _, shell in results.loaded_shells())
+    return asked or loaded or any(brace.cut is not None for brace in results.bracing)
 
 
 def _held(archive: Archive) -> str:

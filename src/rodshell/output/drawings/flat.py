@@ -47,6 +47,7 @@ _SIGNS = {
 }
 TALL = 15.0  # text sizes from strip to strip
 SLOT = 5.0  # further ones where widths of slots are written
+MOST_EQUAL = 8  # rods that one strip stands for: their names have room below it
 LEADING = 1.4  # text sizes from line to line of the legend
 
 
@@ -141,6 +142,26 @@ class FlatPlan:
             f"longest {self.rounding.mm(max(lengths, default=0.0))} mm"
             + (", with allowances" if self.allowances else "")
         )
+
+    @cached_property
+    def equal(self) -> dict[str, list[str]]:
+        """The first of rods whose strips are the same within half a digit, and all of them, at most MOST_EQUAL."""
+        layer, groups = {rod.id: rod.record.layer for rod in self.rods}, list[tuple[object, Floats, list[str]]]()
+        for rod in self.rods:
+            blank, here, along = self.blanks.get(rod.id), rod.record.layer, rod.record.stiffness
+            met = [(joint.other, _over(layer.get(joint.other), here)) for joint in rod.record.joints]
+            outline = np.empty(0) if blank is None else blank.outline.ravel()
+            marks = [(joint.at, joint.slot or 0.0) for joint in rod.record.joints]
+            numbers = [rod.cut_length, rod.allowance, *np.ravel(marks), *rod.record.splices, *outline]
+            words, sizes = (here, met, along, len(rod.record.splices)), np.array(numbers)
+            for same, first, ids in groups:
+                near = same == words and first.shape == sizes.shape and len(ids) < MOST_EQUAL
+                if near and np.allclose(first, sizes, rtol=0.0, atol=0.5e-3 * self.rounding.step):
+                    ids.append(rod.id)
+                    break
+            else:
+                groups.append((words, sizes, [rod.id]))
+        return {ids[0]: ids for _, _, ids in groups}
 
     @property
     def allowances(self) -> bool:
@@ -316,22 +337,25 @@ def side_ticks(pencil: Pencil, low: Floats, high: Floats, text: float, count: in
 
 
 def strips_drawing(plan: FlatPlan, text: float, rods: Sequence[GridRod] | None = None) -> Drawing:
-    """The strips of some rods (default: all) one below the other [mm], all starting at x = 0."""
+    """The strips of some rods, each for all that equal it (default: each rod's own), one below the other [mm], all
+    starting at x = 0."""
     pencil, y = Pencil(), 0.0
     layer = {rod.id: rod.record.layer for rod in plan.rods}
     chosen = plan.rods if rods is None else rods
     for k, rod in enumerate(chosen):
         y -= strip_size(plan, rod, text)[1]
-        _strip(pencil, rod, plan.blanks.get(rod.id), y - k * TALL * text, text, layer, plan.rounding.mm)
+        ids = [rod.id] if rods is None else plan.equal.get(rod.id, [rod.id])
+        _strip(pencil, rod, ids, plan.blanks.get(rod.id), y - k * TALL * text, text, layer, plan.rounding.mm)
     for row, line in enumerate(_legend(plan)):
         pencil.write(line, (0.0, y - len(chosen) * TALL * text + (9.0 - LEADING * row) * text), text, "DIM")
     return pencil.done("strips", _STRIPS_TITLE, text)
 
 
 def sheets_of_strips(plan: FlatPlan, height: float, text: float) -> list[list[GridRod]]:
-    """The rods whose strips find room one below the other in a height [mm], with texts of a size [mm]."""
+    """The rods whose strips find room one below the other in a height [mm], with texts of a size [mm]; of equal rods
+    the first."""
     sheets, left = list[list[GridRod]](), 0.0
-    for rod in plan.rods:
+    for rod in (rod for rod in plan.rods if rod.id in plan.equal):
         taken = TALL * text + strip_size(plan, rod, text)[1]
         if not sheets or taken > left + 1e-9 * height:
             sheets.append([])
@@ -354,12 +378,14 @@ def _legend(plan: FlatPlan) -> list[str]:
 
 
 def _strip(
-    pencil: Pencil, rod: GridRod, blank: Blank | None, y: float, text: float, layer: dict[str, int | None], mm: Show
-) -> None:
-    """One rod: above it the distances and the rods that are met there, below it what it is."""
+    pencil: Pencil, rod: GridRod, ids: list[str], blank: Blank | None, y: float, text: float,
+    layer: dict[str, int | None], mm: Show,
+) -> None:  # fmt: skip
+    """One rod, or equal ones: above it the distances and the rods that are met there, below it what it is."""
     cut, start = 1e3 * rod.cut_length, 1e3 * rod.from_cut_end(0.0)
     note = f"{rod.id}: {mm(rod.cut_length)} mm"
-    words = [rod.id, f"cut {mm(rod.cut_length)}", f"layer {rod.record.layer}" if rod.record.layer is not None else ""]
+    named = ", ".join(ids) if len(ids) == 1 else f"{len(ids)} \N{MULTIPLICATION SIGN} {', '.join(ids)}"
+    words = [named, f"cut {mm(rod.cut_length)}", f"layer {rod.record.layer}" if rod.record.layer is not None else ""]
     if blank is None:
         pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=note)
     else:
@@ -390,11 +416,15 @@ def _strip(
     top = y if blank is None else y + 1e3 * blank.board[1]
     spaced = spread([float(marks[at][0]) for at, _, _ in stops], 1.15 * text)
     for (at, name, kind), x in zip(stops, spaced, strict=True):
-        here, other = rod.record.layer, layer.get(name)
-        below = here is not None and other is not None and other > here
+        below = _over(layer.get(name), rod.record.layer)
         said = f"{mm(1e-3 * at)}  {name}{slots.get(name, '')}".rstrip()
         ends = None if blank is None else 1e3 * blank.across(1e-3 * (at - start)) + (0.0, y)
         _stop(pencil, marks[at], ends, (float(x), top), text, said, kind, named=bool(name), full=below)
+
+
+def _over(other: int | None, here: int | None) -> bool:
+    """Whether a layer is known to lie over that of a rod."""
+    return here is not None and other is not None and other > here
 
 
 def _section_marks(along: Stiffness) -> list[tuple[float, str]]:

@@ -19,16 +19,18 @@ from rodshell.figures.form import Material, RodType
 from rodshell.figures.records import json_text
 from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
+from rodshell.output.grid import supported
 from rodshell.output.labels import Label, Room, closed_segments, nearby, segments, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
 from rodshell.results.archive import input_hash
 from rodshell.results.results import Drawings
+from rodshell.results.states import DRAPED
 from rodshell.results.verdict import verdict_of
 from rodshell.results.wording import joint_rows, nice_step, rounded, rounding_of, section_text, stress
 
 NOTE = "Design aid, not code compliance"
-_NOT_GIVEN = "not given"
+NOT_GIVEN = "not given"
 MORE = " (more: report.html)"  # after a verdict that is shortened or has several reasons
 WARNING = "#b3372c"
 COLUMNS = 4  # of entries, side by side
@@ -80,16 +82,16 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
     kept = results.plain()
     source = archive.case_toml or json_text({key: kept.get(key) for key in ("rods", "boundary")})
     entries = (
-        ("Project", given.project or _NOT_GIVEN),
-        ("Drawn by", given.author or _NOT_GIVEN),
+        ("Project", given.project or NOT_GIVEN),
+        ("Drawn by", given.author or NOT_GIVEN),
         ("Date", given.date or (source_date() or datetime.now(UTC)).date().isoformat()),
         ("Revision", given.revision or "-"),
-        ("Section", section_text(rod.section) or _NOT_GIVEN),
-        ("Material", _material(rod.material) or _NOT_GIVEN),
+        ("Section", section_text(rod.section) or NOT_GIVEN),
+        ("Material", _material(rod.material) or NOT_GIVEN),
         ("Joints", _in_words(joint_rows(results.joint)) or "ball"),
-        ("Rods", f"{len(results.rods)}"),
+        ("Supports", supported(final) if (final := archive.final or DRAPED) != DRAPED else "none, as draped"),
         ("Units", f"mm, shown to {rounding_of(results).words}"),
-        ("Tolerance", _NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
+        ("Tolerance", NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
         ("Input", input_hash(source, archive.inputs)),
         ("Made by", f"rodshell {results.version_rodshell or '(version unknown)'}"),
     )
