@@ -47,13 +47,13 @@ def read(scene: Scene | None) -> tuple[dict[str, Any], Callable[[dict[str, Any]]
     return json.loads(content[4 : 4 + length]), array
 
 
-def test_the_head_has_plan_height_mass_section_and_supports(tmp_path: Path) -> None:
+def test_the_head_has_plan_rise_mass_section_and_supports(tmp_path: Path) -> None:
     """A hemisphere of 0.2 m, of rods of 2 mm at 1000 kg/m3."""
     made = archive("dome")
     head = page_of(made, tmp_path).read_text(encoding="utf-8").partition("</header>")[0].partition("<header>")[2]
     metres = sum(rod.length or 0.0 for rod in made.results.rods)
     mass = wording.rounded(1000 * np.pi * 0.001**2 * metres)
-    line = f"0.4 x 0.4 m in plan, 0.2 m high, {mass} kg, circle, radius 1 mm, clamped ends (directions held)"
+    line = f"0.4 x 0.4 m in plan, rise 0.2 m, {mass} kg, circle, radius 1 mm, clamped ends (directions held)"
     assert f"<p>{line}</p>" in head
     assert "not given" not in size_text(table_archive())  # without a section
 
