@@ -70,6 +70,8 @@ def test_labels_of_no_sheet_cover_each_other(name: str) -> None:
     sheets, paper = sheet_set(named(name))
     for sheet in sheets:
         assert covered(sheet) == [], sheet.title
+        # read from below or from the right, up to 15 degrees past the vertical
+        assert all(-75.0 <= np.degrees(text.angle) <= 105.0 for text in sheet.texts), sheet.title
         low, high = sheet.box()
         assert np.all(low >= 0)
         assert np.all(high <= paper)

@@ -96,11 +96,11 @@ def report_html(archive: Archive) -> str:
 
 
 def size_text(archive: Archive) -> str:
-    """The final shell in one line: its plan and height, what rods and joints weigh, section and supports."""
+    """The final shell in one line: its plan and rise, what rods and joints weigh, section and supports."""
     known, words = dict(title_block(archive, "").entries), list[str]()
     if archive.final is not None:
         across, along, height = (wording.rounded(size, 3) for size in np.ptp(archive.states[archive.final], axis=0))
-        words.append(f"{across} x {along} m in plan, {height} m high")
+        words.append(f"{across} x {along} m in plan, rise {height} m")
     if (made := archive.results.fabrication) and made.total_mass is not None:
         words.append(f"{wording.rounded(made.total_mass, 3)} kg")
     words += [known["Section"]] if known["Section"] != NOT_GIVEN else []
