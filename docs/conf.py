@@ -1,4 +1,4 @@
-"""The site's settings, for Sphinx: `make docs`. Pages that follow from the source are written first, into docs/generated/."""
+"""Settings of the site, for Sphinx: `make docs`. Pages made of the source are first written into docs/generated/."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Documents at the root of the repository, as pages in docs/generated/: their links lead to the pages made of the others."""
+"""Documents at the root of the repository, as pages in docs/generated/, with links to the pages of the others."""
 
 import re
 from pathlib import Path
