@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed accept-hosts attack release-checks ci-full house paper pictures bench bench-quick bench-rods
+.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed accept-hosts attack release-checks ci-full house paper pictures bench bench-quick bench-rods docs
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -99,6 +99,9 @@ house:     ## print the source by room, before and after: statements, lines, pub
 
 paper:     ## the paper's figures again, into docs/paper/ and docs/paper.md (some minutes)
 	python docs/paper.py
+
+docs:      ## the site, into build/docs/, without a warning (pip install -e ".[docs]")
+	python -m sphinx -W --keep-going -q -b html docs build/docs
 
 pictures:  ## the README's pictures, made by the program
 	python docs/pictures.py
