@@ -64,8 +64,10 @@ def beam_faults(results: Results, ends: Ends) -> Iterator[Said]:
 
 def _forces(results: Results) -> Iterator[Floats]:
     """(2m, 3) forces of the supports, without loads and under each combination, with every end condition."""
-    loaded = (shell.support_forces for _, _, shell in results.loaded_shells())
-    for forces in (*(held.forces for held in results.reactions.values()), *loaded):
+    unloaded = {ends: held.forces for ends, held in results.reactions.items()}
+    found = [*unloaded.items(), *((ends, shell.support_forces) for _, ends, shell in results.loaded_shells())]
+    given = SupportGroups.name in unloaded  # then pinned and clamped ends are for comparison
+    for forces in (forces for ends, forces in found if not given or ends == SupportGroups.name):
         if len(forces) == len(results.boundary):
             yield forces
 
