@@ -102,7 +102,7 @@ def test_a_groined_shell_forms_in_four_patches_from_the_command_line(mesh, tmp_p
     said = capsys.readouterr().err
     assert "creased" in said
     lines = said.split('--seams.lines "')[1].split('"')[0]
-    assert main(["form", str(tmp_path / "groin.obj"), "--seams.lines", lines, *options]) == 0
+    assert main(["form", str(tmp_path / "groin.obj"), "--seams.lines", lines, "--verbose", *options]) == 0
     assert "patch D" in capsys.readouterr().out
     found = read(tmp_path / "out")
     assert [patch.id for patch in found.results.patches] == ["A", "B", "C", "D"]

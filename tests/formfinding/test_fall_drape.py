@@ -147,7 +147,7 @@ def test_the_summary_of_a_fall_begins_with_its_rest_and_its_ends_against_the_exa
         "--only",
         "csv",
     ]
-    main(["form", "hemisphere", "--method", "paper", *options, "--out", str(tmp_path / "fallen")])
+    main(["form", "hemisphere", "--method", "paper", *options, "--verbose", "--out", str(tmp_path / "fallen")])
     first, second = capsys.readouterr().out.splitlines()[:2]
     found = re.search(
         r"at rest after [\d.]+ s; rod ends off the exact net's: max ([\d.]+) mm, median ([\d.]+) mm", first

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 QUICK = {
     "form": ["--only", "csv", "--checks.stages", "0", "--pop_up.ends", "clamped"],
-    "refine": ["--only", "csv", "--checks.stages", "0", "--layout.spacing", "60 mm"],
+    "refine": ["--only", "csv", "--checks.stages", "0"],
 }
 """What is added to a command so that it does no more than it must."""
 

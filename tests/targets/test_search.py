@@ -70,7 +70,7 @@ def test_gap_is_that_of_the_clamped_pop_up():
 def test_the_command_line_searches_shows_the_table_and_keeps_numbers(tmp_path: Path, capsys) -> None:
     out = tmp_path / "out"
     arguments = ["form", "ellipsoid", "--rotate", "auto", "--spacing", "50mm", "--rods", "auto", "--length", "auto"]
-    assert main([*arguments, "--out", str(out)]) == 4  # rubber rods
+    assert main([*arguments, "--verbose", "--out", str(out)]) == 4  # rubber rods
     assert "largest shear [deg] by anchor" in capsys.readouterr().out
     case = load_case(out / "case.toml")
     assert case.layout.rotate == 0.0

@@ -163,9 +163,8 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
         archive = form.archive()
         summary = archive.summary(verbose=output.verbose)
         if output.verbose:
-            summary = "\n".join(
-                filter(None, [form.search.table() if form.search else "", summary, _offer(form, progress, in_time)])
-            )
+            searched = form.search.table() if form.search is not None else ""
+            summary = "\n".join(filter(None, [searched, summary, _offer(form, progress, in_time)]))
         outcome = Outcome(
             archive.results.status,
             summary,
