@@ -115,6 +115,16 @@ def creep_rows() -> Iterator[Row]:
     yield Row("cap, little load", "deflection after years over 1 + k, off 1", abs(ratio / (1 + CREEP) - 1), CLOSED)
 
 
+def example_rows() -> Iterator[Row]:
+    """Examples that are said to stand under their loads with their reserve."""
+    for name in ("garden", "pavilion"):
+        form = rs.Job.load(f"examples/loads/{name}.toml").run()
+        level = form.verdict.level
+        shell = form.archive().results.loads["winter"]["pinned"]
+        least = min(shell.limit_factor or np.inf, shell.imperfect_factor or np.inf)
+        yield Row(f"example {name}", "judged otherwise than good", float(level != "good"), 0, note=f"{least:.2f} times")
+
+
 def chance_rows(count: int = SHELLS) -> Iterator[Row]:
     """Braced shells by chance under 1.35 own + 1.5 snow and 1.35 own: none is good that falls by other code."""
     rng, levels, wrong = np.random.default_rng(44), Counter[str](), list[str]()
