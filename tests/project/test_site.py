@@ -8,7 +8,7 @@ import click
 import pytest
 
 import rodshell
-from docs.generators import api, case_file, commands, findings
+from docs.generators import api, case_file, commands, examples, findings, repository
 from rodshell.case import case_keys
 from rodshell.case.case import Case
 from rodshell.case.keys import case_tables
@@ -90,3 +90,24 @@ def test_the_extra_of_the_site_has_what_its_settings_load() -> None:
     for module in ("latex2mathml", "myst_parser", "pydata_sphinx_theme"):
         assert module in (root / "docs" / "conf.py").read_text()
         assert module.replace("_", "-") in extra
+
+
+def test_every_example_is_in_the_gallery_with_a_title_of_its_own(tmp_path: Path) -> None:
+    """And the program in it is the example's, but for the title."""
+    examples.write_examples(tmp_path)
+    titles = examples.titles()
+    assert len(set(titles.values())) == len(titles)
+    for path in examples.EXAMPLES.glob("*.py"):
+        text = (tmp_path / path.name).read_text()
+        head = f"{titles[path.stem]}\n{'=' * len(titles[path.stem])}\n\n"
+        assert text.startswith('"""\n' + head)
+        assert text.replace("\n" + head, "", 1) == path.read_text()
+
+
+def test_links_of_the_readme_lead_to_pages_of_the_site() -> None:
+    root = Path(__file__).parents[2]
+    for target in re.findall(r"\]\(([^)\s#]+)", repository.page("README.md")):
+        if target.startswith("gallery/"):
+            assert target[8:-4] in {"index", *examples.titles()}, target
+        elif target.startswith("../"):
+            assert (root / "docs" / "generated" / target).resolve().is_relative_to(root / "docs"), target
