@@ -1,14 +1,20 @@
 """Pages of the site that follow from the source or from files outside of docs/: one module for each, Sphinx in none."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
-from docs.generators import repository
+from docs.generators import api, case_file, commands, findings, repository
 
-PAGES = {
+PAGES: dict[str, Callable[[], str]] = {
     "overview.md": lambda: repository.page("README.md"),
     "changelog.md": lambda: repository.page("CHANGELOG.md"),
     "contributing.md": lambda: repository.page("CONTRIBUTING.md"),
     "security.md": lambda: repository.page("SECURITY.md"),
+    "case_file.md": case_file.page,
+    "commands.md": commands.page,
+    "findings.md": findings.page,
+    **{f"api_{part}.md": partial(api.page, part) for part in api.PARTS},
 }
 
 

@@ -16,8 +16,8 @@ def _moved(link: re.Match[str]) -> str:
     target = link[1]
     if re.match(r"[a-z]+:|#", target):
         return link[0]
-    if target == "examples":
-        return "](../../examples/gallery.py)"
+    if example := re.fullmatch(r"examples(?:/(\w+)\.py)?", target):
+        return f"](gallery/{example[1] or 'index'}.rst)"
     document, _, rest = target.partition(".md")
     if document in DOCUMENTS:
         return f"]({DOCUMENTS[document]}.md{rest})"

@@ -1,0 +1,113 @@
+"""The site's pages that follow from the source have all that the source has."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import click
+import pytest
+
+import rodshell
+from docs.generators import api, case_file, commands, examples, findings, repository
+from rodshell.case import case_keys
+from rodshell.case.case import Case
+from rodshell.case.keys import case_tables
+from rodshell.cli.app import COMMANDS, app
+from rodshell.figures.findings import CODES
+from rodshell.schema import fields_of
+
+KEYS = set(case_keys()) | set(case_tables())
+
+
+def sections(page: str) -> dict[str, str]:
+    """The text below each heading, by its heading."""
+    parts = re.split(r"^#+ (.+)\n", page, flags=re.M)
+    return {head.strip("`[]"): text for head, text in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+def test_every_finding_has_a_section_with_what_to_do() -> None:
+    found = sections(findings.page())
+    for code, meaning in CODES.items():
+        assert meaning[1:] in found[code]
+        assert len(found[code].partition("**What to do.**")[2]) > 30, code
+
+
+def test_what_to_do_names_keys_that_exist() -> None:
+    tables = {path.split(".")[0] for path in KEYS}
+    for code, text in findings.WHAT_TO_DO.items():
+        for word in re.findall(r"`(\w+(?:\.\w+)+)`", text):
+            assert word in KEYS or word.split(".")[0] not in tables or word == "bracing.csv", (code, word)
+
+
+def test_every_public_name_is_on_one_page_of_the_reference() -> None:
+    listed = [name for part in api.PARTS for name in re.findall(r"rodshell\.(\w+)\n", api.page(part))]
+    assert sorted(listed) == sorted(rodshell.__all__)
+
+
+def test_every_key_of_a_case_is_in_its_table_of_the_reference() -> None:
+    found = sections(case_file.page())
+    for path in KEYS - {"loads", "combinations", "supports", "seams.patches"}:
+        table, _, key = path.rpartition(".")
+        if path in case_tables():
+            assert path in found or f"bracing.{key}" == path
+        elif key == "kind":
+            assert "kind = " in found[table]
+        elif not table.startswith("bracing."):  # a rod like that of the grid
+            assert f"| `{key}` |" in found[table], path
+    for field in fields_of(Case):
+        for kind in field.tables if field.rows else ():
+            for inner in fields_of(kind):
+                assert inner.inline or f"| `{inner.name}` |" in found[field.name], (field.name, inner.name)
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("radius", 'a length such as "200 mm", or a plain number in m, above 0'),
+        ("paper", '`"A4"` or `"A3"`'),
+        ("stages", "a whole number of at least 0"),
+        ("kerf", "not negative"),
+    ],
+)
+def test_a_key_of_the_reference_has_its_unit_and_its_bound(key: str, words: str) -> None:
+    row = next(line for line in case_file.page().splitlines() if line.startswith(f"| `{key}` |"))
+    assert words in row
+
+
+def test_every_command_is_in_the_reference_with_its_options() -> None:
+    found = sections(commands.page())
+    for name in COMMANDS:
+        command = app.get_command(click.Context(app), name)
+        assert command is not None
+        for option in command.params:
+            if isinstance(option, click.Option) and not option.hidden and not hasattr(option, "key"):
+                assert option.opts[-1] in found[f"rodshell {name}"], (name, option.opts)
+
+
+def test_the_extra_of_the_site_has_what_its_settings_load() -> None:
+    root = Path(__file__).parents[2]
+    extra = " ".join(tomllib.loads((root / "pyproject.toml").read_text())["project"]["optional-dependencies"]["docs"])
+    for module in ("latex2mathml", "myst_parser", "pydata_sphinx_theme"):
+        assert module in (root / "docs" / "conf.py").read_text()
+        assert module.replace("_", "-") in extra
+
+
+def test_every_example_is_in_the_gallery_with_a_title_of_its_own(tmp_path: Path) -> None:
+    """And the program in it is the example's, but for the title."""
+    examples.write_examples(tmp_path)
+    titles = examples.titles()
+    assert len(set(titles.values())) == len(titles)
+    for path in examples.EXAMPLES.glob("*.py"):
+        text = (tmp_path / path.name).read_text()
+        head = f"{titles[path.stem]}\n{'=' * len(titles[path.stem])}\n\n"
+        assert text.startswith('"""\n' + head)
+        assert text.replace("\n" + head, "", 1) == path.read_text()
+
+
+def test_links_of_the_readme_lead_to_pages_of_the_site() -> None:
+    root = Path(__file__).parents[2]
+    for target in re.findall(r"\]\(([^)\s#]+)", repository.page("README.md")):
+        if target.startswith("gallery/"):
+            assert target[8:-4] in {"index", *examples.titles()}, target
+        elif target.startswith("../"):
+            assert (root / "docs" / "generated" / target).resolve().is_relative_to(root / "docs"), target
