@@ -54,7 +54,7 @@ def test_the_head_has_plan_rise_mass_section_and_supports(tmp_path: Path) -> Non
     head = page_of(made, tmp_path).read_text(encoding="utf-8").partition("</header>")[0].partition("<header>")[2]
     metres = sum(rod.length or 0.0 for rod in made.results.rods)
     mass = wording.rounded(1000 * np.pi * 0.001**2 * metres)
-    line = f"0.4 x 0.4 m in plan, rise 0.2 m, {mass} kg, circle, radius 1 mm, clamped ends (directions held)"
+    line = f"0.4 x 0.4 m in plan, rise 0.2 m, {mass} kg, rod 2 mm, clamped ends (directions held)"
     assert f"<p>{line}</p>" in head
     assert "not given" not in size_text(table_archive())  # without a section
 

@@ -16,7 +16,7 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.output import grid
-from rodshell.results import Archive
+from rodshell.results import Archive, Results
 from rodshell.results.states import ACTING, POPPED, shells_among
 from rodshell.rods.supports import CLAMPED, PINNED
 
@@ -39,10 +39,15 @@ def opensees_files(archive: Archive) -> Iterator[tuple[str, str]]:
     yield "opensees/replay.py", SCRIPT.read_text(encoding="utf-8")
 
 
+def _kind(results: Results) -> str:
+    """Of the joints; results that say nothing of them have ball joints."""
+    return (results.joint.kind if results.joint else None) or "ball"
+
+
 def _left_out(archive: Archive, states: list[str]) -> Iterator[str]:
     """What of a shell the format does not hold."""
     results = archive.results
-    kind = (results.joint.kind if results.joint else None) or "ball"
+    kind = _kind(results)
     if not states or "rod_nodes" not in archive.states or results.rod is None:
         yield "the result has no popped-up shape: run its case until one is found"
     if results.flat_state is not None:
@@ -62,7 +67,6 @@ def _structure(archive: Archive, state: str) -> dict[str, Any]:
     """The JSON of a state; nodes are the entries of `rod_nodes`, so that each belongs to one rod."""
     results, states, rods = archive.results, archive.states, grid.meshed_rods(archive)
     assert results.rod
-    assert results.joint
     ends, nodes = state.removeprefix(POPPED), states["rod_nodes"]
     first = np.cumsum([0, *(len(rod.nodes) for rod in rods)])
     stages = [grid.deployed_shape(archive, name).positions for name in ["flat", *_stages(archive)]] + [states[state]]
@@ -88,7 +92,7 @@ def _structure(archive: Archive, state: str) -> dict[str, Any]:
         "stages": [positions[nodes].round(9).tolist() for positions in stages],
         "mass": mass.tolist(),
         "rods": [{"id": rod.id, "nodes": [*range(a, b)]} for rod, a, b in zip(rods, first, first[1:], strict=False)],
-        "joints": [{"id": name, "nodes": entries, "kind": results.joint.kind} for name, entries in joints],
+        "joints": [{"id": name, "nodes": entries, "kind": _kind(results)} for name, entries in joints],
         "supports": [
             {"id": f"{rod.id}.{k + 1}", "node": named[f"{rod.id}.{k + 1}"]}
             | ({"tangent": results.end_tangents[2 * index + k]} if ends == CLAMPED.name else {})
