@@ -84,6 +84,8 @@ def _rows(owner: type, path: str) -> Iterator[tuple[str, str, str, str]]:
         else:
             default = "the preset's" if owner is Material and field.default is MISSING else _default(field)
             yield f"`{field.name}`", _sentence(field.help), accepted(field), default
+            if field.twice:
+                yield f"`{field.twice}`", f"Twice the {field.name}, in its place", accepted(field), ""
 
 
 def accepted(field: Field) -> str:
