@@ -23,6 +23,7 @@ exclude_patterns = ["generators"]
 default_role = "code"
 add_module_names = False
 autodoc_member_order = "bysource"
+highlight_language = "none"  # of blocks that do not say theirs
 smartquotes = False  # values in quotation marks are copied
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]

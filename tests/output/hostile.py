@@ -30,6 +30,7 @@ def hostile_archive() -> Archive:
     result |= {
         "name": NAMES[9],
         "warnings": list(NAMES),
+        "end_tangents": [[0.0, 0.0, -1.0]] * (2 * len(ids)),
         "dropped": [{"id": name, "reason": name} for name in NAMES],
         "target": {"kind": "mesh", "file": NAMES[10]},
         "drawings": {"project": NAMES[10], "revision": NAMES[0], "author": NAMES[12], "layers": LAYERS},

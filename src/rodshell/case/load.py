@@ -59,9 +59,7 @@ BUILT_IN: dict[str, _Raw] = {
 The pavilion is a shell to stand under: 12 m wide, of GFRP tubes that stay below their permanent design strength.
 """
 
-WORDED = tuple(path for path in case_keys() if path in case_tables())
-"""Tables that words may stand for."""
-
+WORDED = tuple(path for path in case_keys() if path in case_tables())  # tables that words may stand for
 INSTEAD = (("rod.material", "shear", "poisson_ratio"), *((path, "radius", "diameter") for path in WORDED))
 """Of a table two keys of which only one can be given: one from an option goes before the other from the case."""
 

@@ -58,6 +58,8 @@ def _left_out(archive: Archive, states: list[str]) -> Iterator[str]:
         yield f"its joints are of the kind {kind}, and the format holds {', '.join(JOINTS)}"
     if other := [state for state in states if state.removeprefix(POPPED) not in (PINNED.name, CLAMPED.name)]:
         yield f"its supports ({other[0].removeprefix(POPPED)}) are neither pinned nor clamped"
+    if f"{POPPED}{CLAMPED}" in states and not results.end_tangents:
+        yield "the directions of its clamped ends are not in the result"
     braced = any(shell.bracing for by_ends in results.loads.values() for shell in by_ends.values())
     if braced and results.fabrication and results.fabrication.cable_stiffness is None:
         yield "it is braced by laths, and the format holds cables"

@@ -1,0 +1,52 @@
+"""The pages of docs/start/ and docs/tutorials/ can be followed literally, and find what they say."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from rodshell.cli import main, warmup
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
+PAGES = {page.stem: page for room in ("start", "tutorials") for page in sorted((ROOT / "docs" / room).glob("*.md"))}
+QUICK = ["--checks.stages", "0", "--refine.offer", "off"]  # of the form's checks, what the pages do not speak of
+UNBUILDABLE = {"out/thick", "out/dropped", "out/paraboloid"}
+SAID = {
+    "designers": ["24 rods", "2.5 mm"],
+    "engineers": ["above 2.47 times the loads"],
+    "researchers": ["rod ends off the exact net's"],
+    "geodesic_boards": ["use 131 %", "88 % of larch's", "carries only 1.5 times", "2.7 times are asked for"],
+    "rhino_mesh_to_laths": ["only 78 % of it", "1.66 times its own weight"],
+    "fig6_to_sweep": ["3 of 3 designs are finished"],
+}
+"""What a page quotes of what its commands print."""
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_a_page_can_be_followed(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = PAGES[name].read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(warmup, "compile_before_first", lambda **options: 0)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for file, content in re.findall(r"```toml\n# (\S+)\n(.*?)```", text, re.DOTALL):
+        (tmp_path / file).write_text(content)
+    lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+    commands = [shlex.split(line)[1:] for line in lines if line.startswith("rodshell ")]
+    assert commands
+    for command in commands:
+        code = main([*command, *(QUICK if command[0] == "form" else [])])
+        assert code == (4 if UNBUILDABLE & set(command) else 0), command
+    printed = re.sub(r"\s+", " ", capsys.readouterr().out)
+    for words in SAID[name]:
+        assert words in printed, words
+    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(block, {})
+
+
+def test_every_page_is_followed() -> None:
+    assert set(SAID) == set(PAGES) - {"index"}
