@@ -36,6 +36,9 @@ class Said:
         return wrong + ([] if self.exit_code == CODES[self.levels["python"]] else [f"exit code {self.exit_code}"])
 
 
+MORE_REASONS = " (there are more reasons: --verbose, or the report)"  # of which the summary has the first
+
+
 def said_of(*words: str) -> Said:
     """What is said of `rodshell form WORDS`."""
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(io.StringIO()):
@@ -48,7 +51,7 @@ def said_of(*words: str) -> Said:
         verdict = rs.read(out).verdict
         section = re.search(r'<section class="notice (\w+)" aria-label="Verdict">\s*<strong>(.*?)</strong>', page)
         assert section is not None
-        first = printed.getvalue().splitlines()[0].split(": ", 1)[1]
+        first = printed.getvalue().splitlines()[0].split(": ", 1)[1].removesuffix(MORE_REASONS)
     levels = {"python": verdict.level, "result.json": stored["level"], "report": section[1]}
     headlines = {"python": verdict.headline, "summary": first, "report": html.unescape(section[2])}
     return Said(code, levels, headlines)
