@@ -99,8 +99,8 @@ def test_a_rubber_hemisphere_sinks_evenly_under_its_weight():
 
 @pytest.mark.slow
 def test_a_roof_of_thin_laths_is_said_first_not_to_stand():
-    """5 x 15 mm over 12 m: their EA is some 1e5 times EI over the square of the spacing. Differences of the stiffness on
-    one side of a point lose this path after 120 factorisations."""
+    """5 x 15 mm over 12 m: their EA is some 1e5 times EI over the square of the spacing. Differences of the stiffness
+    on one side of a point lose this path after 120 factorisations."""
     case = {"target.unit": "mm", "rod.material.preset": "larch", "checks.stages": 0}
     results = rs.Job.load("examples/data/freeform.obj", case).run().archive().results
     assert {weighed.limit for weighed in results.self_weight.values()} == {"limit point"}

@@ -588,8 +588,8 @@ def test_where_no_size_carries_its_weight_the_place_that_is_too_sharp_is_named()
     form = rs.Job.load({**spruce, "pop_up.ends": "pinned", "checks.stages": 2}).run()
     reason = form.verdict.reasons[0]
     named = re.search(
-        r"its weight asks for (lath \S+ x \S+ mm), and the radius of (\S+) m at (\S+), (\S+) m is too sharp for it: make it "
-        r"flatter than (\S+) m there",
+        r"its weight asks for (lath \S+ x \S+ mm), and the radius of (\S+) m at (\S+), (\S+) m is too sharp for it: "
+        r"make it flatter than (\S+) m there",
         reason,
     )
     assert named is not None, reason
