@@ -34,24 +34,15 @@ from rodshell.rods.supports import BOTH
 from rodshell.schema import read
 
 SPACINGS = (1.0, 0.85, 0.7, 0.6, 0.5, 0.42, 0.35, 0.3, 0.25)  # of the spacing that is taken where none is given
-LEFT = {
-    "none": 1.0,
-    "cables": 0.42,
-    "laths": 0.7,
-    "laths both ways": 0.7,
-}  # share of the linear factor that imperfections leave, at first:
-# .28 to .49 of cables and .55 to .89 of laths on domes of 6 and 12 m
+LEFT = {"none": 1.0, "cables": 0.42, "laths": 0.7, "laths both ways": 0.7}
+"""The share of the linear factor that imperfections leave, at first; .28 to .49 of cables and .55 to .89 of laths were
+found on domes of 6 and 12 m."""
 NEAR = 1.1  # strains are in proportion to the depth, except those by the prestress of cables
 GAIN = 1.5  # exponent of the spacing's inverse by which factors grow at most: .9 to 1.3 were measured
 LIKELY = 1.15  # a path is followed if the reserve may be reached by so much more than is estimated
 RISES = 1.1  # times the share of its own weight that a bare shell carried before: less has not helped
-PRESTRAIN, ROPE, THIN_ROPE, THIN = (
-    5e-4,
-    0.006,
-    0.004,
-    0.025,
-)  # of cables; the thin ones are of rods up to that depth [m]
-ROPE_MODULUS = 160e9  # Pa: of strands
+PRESTRAIN, ROPE_MODULUS = 5e-4, 160e9  # of cables; [Pa] of strands
+ROPE, THIN_ROPE, THIN = 0.006, 0.004, 0.025  # diameters of cables [m]; thin ones are of rods up to that depth
 CREEP: dict[PresetName, float] = {"gfrp": 0.3}  # assumed, of pultruded profiles along their fibres: their makers know
 OF_SIZE = ("strength", "erection_strength", "too_thick", "erection_too_thick", "strength_under_loads")
 OF_STIFFNESS = (

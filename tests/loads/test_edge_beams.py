@@ -73,8 +73,41 @@ def test_a_beam_that_breaks_is_said_and_a_shell_on_it_cannot_be_built() -> None:
     assert any(name in reason and "123 % of its design strength before loads act" in reason for reason in said.reasons)
 
 
-def test_of_a_beam_of_unknown_strength_that_is_said() -> None:
+def test_of_a_beam_of_unknown_strength_that_is_said_with_loads_and_without() -> None:
     form = on(rs.Rod(TUBE_OF_STEEL, rs.Material(200e9, 7850.0)))
-    checked = rs.check_loads(form, one(rs.Snow(10.0), stability=rs.Stability(modes=1, imperfection=0)))
-    assert checked.shells["all"]["given"].edge_beams[0].utilisation is None
-    assert any("the design strength of beams along the edge is not known" in said for said in checked.warnings)
+    said = "the design strength of beams along the edge is not known"
+    assert [said in reason for reason in form.verdict.reasons].count(True) == 1
+    assert not any(said in reason for reason in of_steel().verdict.reasons)
+
+
+def judged(**figures: float | None) -> rs.Verdict:
+    """The verdict on a shell under a combination, its beam having these figures."""
+    form = of_steel()
+    results = form.results()
+    loads = one(rs.Snow(10.0), stability=rs.Stability(modes=1, imperfection=0), strength=Strength(permanent=1e9))
+    shell = rs.check_loads(form, loads).shells["all"]["given"]
+    beam = shell.edge_beams[0].changed(**figures)
+    return verdict(results.changed(loads={"all": {"given": shell.changed(edge_beams=(beam,))}}))
+
+
+@pytest.mark.parametrize(
+    ("euler", "code", "words"),
+    [
+        (1.4, "strength_of_beam", "140 % of its Euler load under all, and buckles between two rod ends"),
+        (0.8, "reserve_under_loads", "80 % of its Euler load under all, and with a reserve of 1.5 it may carry 67 %"),
+        (0.6, None, "Euler"),
+    ],
+)
+def test_a_beam_that_buckles_between_rod_ends_is_said(euler: float, code: str | None, words: str) -> None:
+    found = judged(euler=euler)
+    said = [each for each in found.findings if each.figure == euler]
+    assert [each.code for each in said] == [code] * bool(code)
+    assert any(words in reason for reason in found.reasons) == bool(code)
+    assert code != "strength_of_beam" or found.level == "unbuildable"
+
+
+def test_the_mass_of_beams_is_said_next_to_that_of_the_rods() -> None:
+    form = of_steel()
+    (beam,) = form.results().edge_beams
+    assert beam.mass == pytest.approx(beam.length * 7850 * np.pi * (0.02**2 - 0.018**2))
+    assert f" kg and beams of {beam.mass:.3g} kg along the edge" in form.archive().summary()

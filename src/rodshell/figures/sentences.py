@@ -97,7 +97,7 @@ SENTENCES = {
     ),
     "no_strength": "no strength was given, so it is not known whether the rods hold (checks.strength)",
     "no_strength: others": (
-        "the design strength of {what} is not known, so that whether it breaks under the loads was not judged: "
+        "the design strength of {what} is not known, so that whether it breaks was not judged: "
         "compare its largest forces, which stand with the loads, with what it can carry"
     ),
     "no_strength: durations": "the design strength for {durations} loads is not known and was not judged",
@@ -200,9 +200,17 @@ SENTENCES = {
         "the rods permanently use {share} of {whose}: reduce it for duration and moisture and give the reduced value "
         "as checks.strength, or use thinner rods"
     ),
+    "reserve_under_loads: beam": (
+        "with {ends} ends a span of the beam {beam} along the edge carries {share} of its Euler load {under}, and with "
+        "a reserve of {asked} it may carry {most}: take a stiffer beam, or set rod ends closer"
+    ),
     "strength_of_beam": (
         "with {ends} ends the beam {beam} along the edge uses {share} of its design strength {under}, near the rod end "
         "{place}"
+    ),
+    "strength_of_beam: buckles": (
+        "with {ends} ends a span of the beam {beam} along the edge has to carry {share} of its Euler load {under}, and "
+        "buckles between two rod ends: take a stiffer beam, or set rod ends closer"
     ),
     "strength_of_bracing": "with {ends} ends the bracing uses {share} of its design strength under {place}",
     "strength_under_loads": LOADS,

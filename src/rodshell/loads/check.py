@@ -119,8 +119,6 @@ class LoadChecks:
         every = [shell for by_ends in self.shells.values() for shell in by_ends.values()]
         if any(shell.bracing_utilisation is None and len(shell.bracing_forces) for shell in every):
             yield said("no_strength: others", place="bracing", what="the bracing")
-        if any(beam.utilisation is None for shell in every for beam in shell.edge_beams):
-            yield said("no_strength: others", place="edge beam", what="beams along the edge")
 
 
 def check_shells(

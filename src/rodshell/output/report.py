@@ -31,6 +31,7 @@ from rodshell.results.archive import shown_case
 from rodshell.results.facts import facts
 from rodshell.results.judged.deployment import unknown_below
 from rodshell.results.judged.stress import by_design_strength
+from rodshell.results.judged.supports import mass_text
 from rodshell.results.laths import laths_text
 from rodshell.results.states import is_shell, shells_among
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
@@ -101,8 +102,7 @@ def size_text(archive: Archive) -> str:
     if archive.final is not None:
         across, along, height = (wording.rounded(size, 3) for size in np.ptp(archive.states[archive.final], axis=0))
         words.append(f"{across} x {along} m in plan, rise {height} m")
-    if (made := archive.results.fabrication) and made.total_mass is not None:
-        words.append(f"{wording.rounded(made.total_mass, 3)} kg")
+    words += [mass] if (mass := mass_text(archive.results)) else []
     words += [known["Section"]] if known["Section"] != NOT_GIVEN else []
     return ", ".join([*words, known["Supports"]])
 

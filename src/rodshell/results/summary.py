@@ -11,7 +11,7 @@ from rodshell.results.judged.deployment import unknown_below
 from rodshell.results.judged.loads import UNLOADED, is_braced, least_carried
 from rodshell.results.judged.shape import CONVERGED
 from rodshell.results.judged.stress import strength_name
-from rodshell.results.judged.supports import share_of_span, width
+from rodshell.results.judged.supports import mass_text, share_of_span, width
 from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import thinner_than_sold
@@ -65,8 +65,8 @@ def summary_text(results: Results, *, verbose: bool = False) -> str:
 
 def _extent(results: Results, length: Length) -> str:
     """How wide the shell is, and how heavy."""
-    wide, mass = width(results), results.fabrication.total_mass if results.fabrication else None
-    return f"; {length(wide)} wide" * (wide > 0) + (f", {rounded(mass)} kg" if mass else "")
+    wide, mass = width(results), mass_text(results)
+    return f"; {length(wide)} wide" * (wide > 0) + (f", {mass}" if mass else "")
 
 
 def _gap(results: Results, length: Length) -> Iterator[str]:

@@ -37,7 +37,7 @@ from rodshell.results.judged.shape import (
     unstable,
 )
 from rodshell.results.judged.stress import fibre_faults, rod_points
-from rodshell.results.judged.supports import air_findings, beam_faults
+from rodshell.results.judged.supports import air_findings, beam_faults, beams_to_check
 from rodshell.results.results import Results, Verdict
 from rodshell.results.wording import FORM_AGAIN, percent, rounded, rounded_down, shown_factor, snow_text
 
@@ -86,7 +86,7 @@ def verdict(results: Results) -> Verdict:
     gravest = [*lead, *far, *grave] if off > FAR_OFF else [*lead, *grave, *far]
     to_check = [
         *gravest, *weight, *sinking(results, usable), *load_points(results, usable or there),
-        *creep_unknown(results), *air_findings(results), *_open_points(results, usable),
+        *creep_unknown(results), *beams_to_check(results), *air_findings(results), *_open_points(results, usable),
         *(word if isinstance(word, Said) else Said(word) for word in results.warnings),
     ]  # fmt: skip
     standing, in_doubt = set(usable) - falling(results), none_stands(results, usable, lost)

@@ -351,7 +351,7 @@ class SupportGroups(Support):
 
     def figures(self, moved: Floats, forces: Floats) -> Mapping[str, tuple[float, str]]:
         far, without = np.sqrt((moved**2).sum(axis=1)), unheld(forces)
-        each = {"of a free rod end": without, "of a support": ~without}
+        each = {"of a rod end that no support holds": without, "of a support": ~without}
         largest = {what: float(far[rows].max(initial=0.0)) for what, rows in each.items()}
         return {f"largest displacement {what}": (most, "m") for what, most in largest.items() if most}
 

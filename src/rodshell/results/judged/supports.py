@@ -7,9 +7,10 @@ import numpy as np
 from rodshell.arrays import Floats
 from rodshell.figures.checks import EndsInTheAir
 from rodshell.figures.findings import Said, said
+from rodshell.figures.loads import UsedBeam
 from rodshell.figures.records import Ends
 from rodshell.results.results import Results
-from rodshell.results.wording import newtons, shown_length, too_much
+from rodshell.results.wording import newtons, percent, rounded, shown_length, too_much
 from rodshell.rods.support_groups import SupportGroups, unheld
 
 ABOVE = 0.02  # of the size: higher ends are not on the level of the lowest
@@ -49,17 +50,45 @@ def share_of_span(results: Results, deflection: float | None) -> str:
 
 
 def beam_faults(results: Results, ends: Ends) -> Iterator[Said]:
-    """Beams along the edge that use more than their strength, without loads and under each combination."""
-    if ends != SupportGroups.name:
-        return
-    unloaded = [("before loads act", beam.unloaded) for beam in results.edge_beams]
-    loaded = [(f"under {name}", beam) for name, _, shell in results.loaded_shells() for beam in shell.edge_beams]
-    for under, beam in (*unloaded, *loaded):
-        if beam is not None and (share := beam.utilisation or 0.0) > 1:
+    """Beams along the edge that use more than their strength, or buckle between two rod ends: they have no node there,
+    so that no path of the shell knows of it."""
+    for under, _, beam in _used_beams(results) if ends == SupportGroups.name else ():
+        for name, share in (("strength_of_beam", beam.utilisation), ("strength_of_beam: buckles", beam.euler)):
+            if (share or 0.0) > 1:
+                yield said(
+                    name, ends, share, 1, place=beam.max_stress_at, beam=beam.name, under=under,
+                    share=too_much(share or 0.0),
+                )  # fmt: skip
+
+
+def beams_to_check(results: Results) -> Iterator[Said]:
+    """Beams that carry their spans without the reserve that is asked for, or whose strength is not known."""
+    for under, reserve, beam in _used_beams(results):
+        if 1.0 / reserve < (share := beam.euler or 0.0) <= 1:
             yield said(
-                "strength_of_beam", ends, share, 1, place=beam.max_stress_at, beam=beam.name, under=under,
-                share=too_much(share),
+                "reserve_under_loads: beam", SupportGroups.name, share, 1.0 / reserve, place=beam.max_stress_at,
+                beam=beam.name, under=under, share=percent(share), asked=rounded(reserve), most=percent(1.0 / reserve),
             )  # fmt: skip
+        if beam.utilisation is None:
+            yield said("no_strength: others", place="edge beam", what="beams along the edge")
+
+
+def _used_beams(results: Results) -> Iterator[tuple[str, float, UsedBeam]]:
+    """Each beam without loads and under each combination: under what, in words, with which reserve, and its use."""
+    for beam in results.edge_beams:
+        if beam.unloaded is not None:
+            yield "before loads act", 1.0, beam.unloaded
+    for name, _, shell in results.loaded_shells():
+        yield from ((f"under {name}", shell.reserve or 1.0, beam) for beam in shell.edge_beams)
+
+
+def mass_text(results: Results) -> str:
+    """The mass of rods and joints, and that of beams along the edge; "" where it is not known."""
+    mass = results.fabrication.total_mass if results.fabrication else None
+    beams = sum(beam.mass or 0.0 for beam in results.edge_beams)
+    if mass is None:
+        return ""
+    return f"{rounded(mass)} kg" + (f" and beams of {rounded(beams)} kg along the edge" if beams else "")
 
 
 def _forces(results: Results) -> Iterator[Floats]:
