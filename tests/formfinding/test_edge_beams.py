@@ -11,6 +11,7 @@ from rodshell.checks.reactions import reactions
 from rodshell.errors import InputError
 from rodshell.geometry.chains import along_curve
 from rodshell.model.edge_beam import FittedBeam
+from rodshell.results.judged.supports import in_the_air
 from rodshell.rods.supports import BeamAlong
 from rodshell.solve.modes import frequencies
 from tests.checks.loaded_twin import LathBends, _coordinates
@@ -307,6 +308,38 @@ def test_rod_ends_on_a_beam_are_held_as_another_group_says_wherever_that_stands(
     assert more > 1.05 * less
 
 
+def layered() -> rs.Form:
+    ends = groups(rs.Ring(rod=BEAM), rs.SprungEnds(stiffness=1e6))
+    return rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), TUBE, ends=ends, joint=rs.Pin(eccentricity=0.05))
+
+
+def patched() -> rs.Form:
+    ring = {"kind": "ring", "section": "tube 60x3", "material": {"preset": "steel"}}
+    supports = [{"kind": "sprung", "stiffness": "1000 kN/m"}, ring]
+    target = {"kind": "paraboloid", "radius": 4.0, "height": 1.5}
+    return rs.Job.load({"target": target, "seams.lines": "-5,0.1; 5,0.1", "supports": supports}).run()
+
+
+def test_twist_angles_of_a_beam_have_the_rotary_inertia_of_their_edges() -> None:
+    beam = bare(ring(24), closed=True)
+    mass = np.zeros((24 + 24, 3))
+    beam.add_mass(mass)
+    around = 7850 * np.pi / 2 * (0.04**4 - 0.036**4) * 2 * R * np.sin(np.pi / 24)
+    assert mass[24:, 0] == pytest.approx(np.full(24, around))
+    assert mass[:24, 2].sum() == pytest.approx(24 * 2 * R * np.sin(np.pi / 24) * BEAM.mass_per_length)
+
+
+def test_of_rod_ends_in_the_air_those_on_a_beam_ask_for_nothing() -> None:
+    """A saddle in a ring that stands on its lowest ends; the pinned shell is for comparison alone."""
+    saddle = rs.HeightField(formula="(x^2 - y^2)/16", domain=rs.Disc(5.0))
+    stands = groups(rs.Ring(rod=rs.Rod(rs.Tube(0.1, 0.006), STEEL)), rs.HeldEnds(at="z < -1.4 m"))
+    rod, layout = rs.Rod(rs.Circle(0.006), rs.Material.preset("gfrp")), rs.GridLayout.orthogonal(spacing=1.0, edge=0.34)
+    form = rs.find_form(saddle, layout, rod, ends=("pinned", stands))
+    found = in_the_air(form.archive().results)
+    assert found is not None
+    assert found.highest < 0.17 < 3.0 < np.ptp(form.boundary.points[:, 2])
+
+
 @pytest.mark.parametrize(
     ("build", "words"),
     [
@@ -314,6 +347,8 @@ def test_rod_ends_on_a_beam_are_held_as_another_group_says_wherever_that_stands(
         (lambda: rs.EdgeBeam(rod=BEAM, creep=-0.1), "creep of an edge beam"),
         (lambda: on(rs.EdgeBeam(at="U01.0, U02.0", rod=BEAM)), "three rod ends or more"),
         (lambda: on(rs.EdgeBeam(rod=BEAM)), "let the shell move as a whole"),
+        (lambda: layered(), "joins rods in one layer"),
+        (lambda: patched(), "is for a shell in one patch"),
     ],
 )
 def test_what_cannot_be_is_refused(build, words: str) -> None:

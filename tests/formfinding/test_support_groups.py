@@ -195,6 +195,10 @@ def test_a_case_may_compare_them_with_pinned_ends() -> None:
             lambda: structure_of(on(groups(rs.SprungEnds(stiffness=STIFF))).stages, "given"),
             "supports yield, which no refinement knows",
         ),
+        (
+            lambda: structure_of(on(groups(rs.ClampedEnds(at="y > 6 m"))).stages, "given"),
+            "supports yield, which no refinement knows",
+        ),
         (lambda: on(groups(rs.FreeEnds())), "let the shell move as a whole"),
         (lambda: on(groups(rs.SprungEnds(stiffness=0.0))), "let the shell move as a whole"),
         (lambda: on(groups(rs.SprungEnds(stiffness=(1e5, 1e5, 0.0)))), "let the shell move as a whole"),
@@ -255,3 +259,12 @@ def test_a_group_of_all_rod_ends_that_is_clamped_is_the_clamped_shell() -> None:
     same = on(groups(rs.ClampedEnds())).popped["given"]
     assert np.array_equal(same.positions, clamped_form().popped["clamped"].positions)
     assert not same.shell.yields
+
+
+def test_a_shell_clamped_in_part_is_not_the_one_that_turned_ends_lead_to() -> None:
+    """What turning the ends of the pinned shell leads to is held against a shell with all ends clamped, or none."""
+    part = groups(rs.ClampedEnds(at="y > 6 m"))
+    form = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), TUBE, ends=("pinned", part))
+    assert form.archive().results.deployment.clamped.reached_from_flat is None
+    whole = rs.find_form(rs.Cap(10.0, 4.0), grid(3.0, 1.5), TUBE, ends=("pinned", "clamped"))
+    assert whole.archive().results.deployment.clamped.reached_from_flat is not None
