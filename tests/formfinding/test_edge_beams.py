@@ -348,7 +348,7 @@ def test_of_rod_ends_in_the_air_those_on_a_beam_ask_for_nothing() -> None:
         (lambda: on(rs.EdgeBeam(at="U01.0, U02.0", rod=BEAM)), "three rod ends or more"),
         (lambda: on(rs.EdgeBeam(rod=BEAM)), "let the shell move as a whole"),
         (lambda: layered(), "joins rods in one layer"),
-        (lambda: patched(), "is for a shell in one patch"),
+        (lambda: patched(), "not on given: leave out the seams"),
     ],
 )
 def test_what_cannot_be_is_refused(build, words: str) -> None:

@@ -53,12 +53,10 @@ def _fitted(shell: Shell, held: Equilibrium, beams: Sequence[BeamAlong]) -> tupl
     """A shell with beams along its edge, free of stress in its equilibrium `held`.
 
     Raises:
-        InputError: rods lie in layers, so that their ends do not lie along one curve; the shell is in patches.
+        InputError: rods lie in layers, so that their ends do not lie along one curve; two of them are in one place.
     """
     if shell.mesh.layered:
         raise InputError("a beam along the edge joins rods in one layer: set joint.eccentricity to 0, or leave it out")
-    if shell.grid_of.max() > 0:
-        raise InputError("a beam along the edge is for a shell in one patch: leave out the patches, or the beam")
     normals = node_normals(shell.mesh, shell.positions(held.state))[shell.mesh.ends.ravel()]
     done, first = list[FittedBeam](), len(held.state)
     for along in beams:
