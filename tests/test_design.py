@@ -7,9 +7,11 @@ from functools import cache
 import pytest
 
 import rodshell as rs
+from rodshell import design
 from rodshell.case.load_tables import usual_loads
 from rodshell.design import CREEP, Candidate, bracing_of
 from rodshell.errors import InputError, OutOfTimeError
+from rodshell.loads.check import Estimate
 from rodshell.rods.section import TRADE_SIZES, Section, Tube, size_text
 
 ALL = "section, bracing, spacing"
@@ -189,3 +191,21 @@ def test_the_usual_loads_are_those_of_the_code() -> None:
     assert isinstance(wind, rs.Wind)
     along = [wind._formula(x, 0.0) for x in (-3.0, 0.0, 3.0)]  # type: ignore[misc]
     assert along == pytest.approx([0.5, -0.8, -0.2])
+
+
+@pytest.mark.parametrize(("shares", "helps"), [((0.5, 0.52), False), ((0.5, 0.7, 0.9), True)])
+def test_rods_are_set_closer_only_while_that_helps_a_shell_that_falls_under_its_weight(
+    shares: tuple[float, ...], helps: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By what the estimate says of each spacing in turn; nothing is computed of them."""
+    form, left = rs.Job.load({**SMALL, **PINNED, **COARSE}).run(until="pop-up"), [*shares]
+
+    def estimated(stages: object, loads: object, **how: object) -> Estimate:
+        bare = left.pop(0) if len(left) > 1 else left[0]
+        return Estimate({"winter": 0.01}, bare, 0.9, (0.0, 0.0), 2.0)
+
+    monkeypatch.setattr(design, "estimate", estimated)
+    asked = rs.Job.load({**SMALL, **SNOW, "design.open": ALL}).case
+    search = design.Search(asked, lambda case, earlier: form, lambda *said: None, lambda sentence: None)
+    tried = [each for each in search._grids() if search._stands(*each) is None]
+    assert (len({spacing for spacing, _ in tried}) > 2) == helps
