@@ -40,6 +40,7 @@ found on domes of 6 and 12 m."""
 NEAR = 1.1  # strains are in proportion to the depth, except those by the prestress of cables
 GAIN = 1.5  # exponent of the spacing's inverse by which factors grow at most: .9 to 1.3 were measured
 LIKELY = 1.15  # a path is followed if the reserve may be reached by so much more than is estimated
+APART = 0.6  # of a spacing at which a bracing breaks the shell, or pulls it out of its shape: the next one to try
 RISES = 1.1  # times the share of its own weight that a bare shell carried before: less has not helped
 PRESTRAIN, ROPE_MODULUS = 5e-4, 160e9  # of cables; [Pa] of strands
 ROPE, THIN_ROPE, THIN = 0.006, 0.004, 0.025  # diameters of cables [m]; thin ones are of rods up to that depth
@@ -214,6 +215,7 @@ class Search:
             k = max(thin, default=allowed[0])
         fitting = [k for k, found in tried.items() if found is not None and found.used <= 1]
         if not fitting:
+            self.hope[bracing] = APART * spacing
             for found in filter(None, tried.values()):
                 self._keep(found, 0.0)
                 self._say(found, "estimate", None, "is too thick for its sharpest bend")
@@ -297,12 +299,14 @@ class Search:
         size = _name(best.candidate.section)
         if best.used > 1:
             return f"strength: {_place(best)} is too sharp for {size}: {_flatter(best)}{also}"
-        share = self.best_factor / best.linear
+        share, sharp = self.best_factor / best.linear, best
         for section in self.sections:
             if section.depth <= best.candidate.section.depth:
                 continue
             if (found := self._tried(replace(best.candidate, section=section))) is None:
                 break
+            if found.used > 1 and sharp is best:
+                sharp = found
             if share * found.linear < self.reserve:
                 continue
             asked_for = f"stability asks for {_name(section)}"
@@ -312,7 +316,11 @@ class Search:
                 return f"strength while it is erected allows {size}, {asked_for}: erect it in another way{also}"
             return f"room for joints, a tenth of the spacing, allows {size}, {asked_for}{also}"
         most = rounded_down(self.best_factor)
-        return f"stability: {size} carries {most} of the {rounded(self.reserve)} times that are asked for{also}"
+        short = f"carries {most} of the {rounded(self.reserve)} times that are asked for"
+        if sharp is best:
+            return f"stability: {size} {short}{also}"
+        thicker = "thicker ones that are sold would use more than their strength there"
+        return f"strength: {_place(sharp)} allows {size}, which {short}, and {thicker}{also}"
 
     def _made(self, form: Form, limits: str) -> Form:
         """The form of the design, as one of the case that was asked for."""

@@ -28,10 +28,9 @@ from rodshell.output.svg import SCALE, inline
 from rodshell.output.viewer import scene_of, viewer_script, viewer_style
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
-from rodshell.results.facts import facts
+from rodshell.results.facts import facts, mass_text
 from rodshell.results.judged.deployment import unknown_below
 from rodshell.results.judged.stress import by_design_strength
-from rodshell.results.judged.supports import mass_text
 from rodshell.results.laths import laths_text
 from rodshell.results.states import is_shell, shells_among
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent

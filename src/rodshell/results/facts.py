@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from rodshell.figures.checks import Deployment
 from rodshell.figures.records import Ends
 from rodshell.results.judged.deployment import unknown_below
+from rodshell.results.judged.loads import is_braced
 from rodshell.results.judged.shape import CONVERGED, OFF
 from rodshell.results.judged.stress import by_design_strength, utilisation
 from rodshell.results.results import Results
 from rodshell.results.verdict import shell_faults
-from rodshell.results.wording import drawn_length, percent, whole_percent
+from rodshell.results.wording import drawn_length, percent, rounded, whole_percent
 from rodshell.rods.supports import clamped_among, finals_first
 
 MUCH_LESS = 0.5  # clamped supports are recommended when they leave less than this share of the pinned gap,
@@ -75,3 +76,13 @@ def _known(deployment: Deployment | None, unknown: float) -> str:
     if deployment.snaps:
         return "in the final shape and the stages of the deployment; the stress during a snap is not known."
     return "deployment included."
+
+
+def mass_text(results: Results) -> str:
+    """The mass of rods and joints, and that of beams along the edge; "" where it is not known."""
+    mass = results.fabrication.total_mass if results.fabrication else None
+    beams = sum(beam.mass or 0.0 for beam in results.edge_beams)
+    if mass is None:
+        return ""
+    said = f"{rounded(mass)} kg{' without its bracing' if is_braced(results) else ''}"
+    return said + (f" and beams of {rounded(beams)} kg along the edge" if beams else "")

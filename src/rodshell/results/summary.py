@@ -7,11 +7,12 @@ from rodshell.figures.checks import OTHER_SHAPES, Bending, SelfWeight, WorstBent
 from rodshell.figures.form import Bent, RodType
 from rodshell.figures.loads import DesignStrength
 from rodshell.figures.records import printable
+from rodshell.results.facts import mass_text
 from rodshell.results.judged.deployment import unknown_below
 from rodshell.results.judged.loads import UNLOADED, is_braced, least_carried
 from rodshell.results.judged.shape import CONVERGED
 from rodshell.results.judged.stress import strength_name
-from rodshell.results.judged.supports import mass_text, share_of_span, width
+from rodshell.results.judged.supports import share_of_span, width
 from rodshell.results.laths import laths_text, lengths_text
 from rodshell.results.results import Results
 from rodshell.results.sizes_sold import thinner_than_sold
@@ -53,7 +54,8 @@ def summary_text(results: Results, *, verbose: bool = False) -> str:
     lines = [
         f"{results.name or 'rodshell'}: {said[0]}{'' if verbose else more}",
         *(f"            {reason}" for reason in said[1:] if verbose),
-        f"  grid      {len(results.rods)} rods, {_joints(results, length)}{laths}{_extent(results, length)}",
+        f"  grid      {len(results.rods)} rods{_apart(results, length)}, {_joints(results, length)}{laths}"
+        f"{_braced(results)}{_extent(results, length)}",
         *([f"  rod       {rod_text(results.rod)}"] if results.rod else []),
         *_gap(results, length),
         *_stress(results),
@@ -61,6 +63,20 @@ def summary_text(results: Results, *, verbose: bool = False) -> str:
         *(_details(results, length) if verbose else ()),
     ]
     return "\n".join(map(printable, lines))
+
+
+def _apart(results: Results, length: Length) -> str:
+    """How far neighbouring rods are from each other, where the case says it."""
+    spacing = results.layout.spacing if results.layout else None
+    return f" {' x '.join(map(length, dict.fromkeys(spacing)))} apart" if spacing else ""
+
+
+def _braced(results: Results) -> str:
+    """By what the shell under loads is braced."""
+    if not is_braced(results):
+        return ""
+    cables = any(brace.cut is not None for brace in results.bracing)
+    return f"; braced by {'cables' if cables else 'laths'} along {len(results.bracing)} diagonals"
 
 
 def _extent(results: Results, length: Length) -> str:

@@ -82,15 +82,6 @@ def _used_beams(results: Results) -> Iterator[tuple[str, float, UsedBeam]]:
         yield from ((f"under {name}", shell.reserve or 1.0, beam) for beam in shell.edge_beams)
 
 
-def mass_text(results: Results) -> str:
-    """The mass of rods and joints, and that of beams along the edge; "" where it is not known."""
-    mass = results.fabrication.total_mass if results.fabrication else None
-    beams = sum(beam.mass or 0.0 for beam in results.edge_beams)
-    if mass is None:
-        return ""
-    return f"{rounded(mass)} kg" + (f" and beams of {rounded(beams)} kg along the edge" if beams else "")
-
-
 def _forces(results: Results) -> Iterator[Floats]:
     """(2m, 3) forces of the supports, without loads and under each combination, with every end condition."""
     unloaded = {ends: held.forces for ends, held in results.reactions.items()}
