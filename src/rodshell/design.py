@@ -374,8 +374,8 @@ def _name(section: Section | GivenSection) -> str:
 
 def _place(tried: Tried) -> str:
     """Where the rods use most of their strength."""
-    x, y = tried.known.place
-    return f"the radius of {rounded(tried.known.radius)} m at {x:.3g}, {y:.3g} m"
+    x, y = (round(each, 3) + 0.0 for each in tried.known.place)
+    return f"the radius of {rounded(tried.known.radius)} m at {x:g}, {y:g} m"
 
 
 def _flatter(tried: Tried) -> str:

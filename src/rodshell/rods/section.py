@@ -436,7 +436,7 @@ def _rods(*diameters: float) -> tuple[Section, ...]:
 
 def _tubes(*sizes: tuple[float, float]) -> tuple[Section, ...]:
     """Outer diameter and wall [mm]."""
-    return tuple(Tube(d / 1e3 / 2, wall / 1e3) for d, wall in sizes)
+    return tuple(Tube(round(d / 2e3, 9), wall / 1e3) for d, wall in sizes)
 
 
 def _laths(*sizes: tuple[float, float]) -> tuple[Section, ...]:
