@@ -835,6 +835,28 @@ def test_loads_to_which_a_shell_could_not_be_followed_are_no_loads_under_which_i
     assert "no equilibrium was found" in none.headline
 
 
+@pytest.mark.parametrize("what", ["limit", "imperfect", "years", "years, imperfect"])
+@pytest.mark.parametrize(("factor", "known"), [(1.4, False), (1.6, True), (None, False)])
+def test_what_was_followed_beyond_the_reserve_is_known_well_enough(
+    what: str, factor: float | None, known: bool
+) -> None:
+    """As far as it was followed the shell is stable; where no imperfect equilibrium was found nothing is known."""
+    if factor is None and "imperfect" not in what:
+        return
+    stands = {
+        "limit_factor": 3.0,
+        "limit_kind": "limit point",
+        "imperfect_factor": 2.0,
+        "imperfect_kind": "limit point",
+    }
+    name = "imperfect" if "imperfect" in what else "limit"
+    lost = {f"{name}_factor": factor, f"{name}_kind": "not followed"}
+    years = {"creep": 0.8, **stands, **(lost if "years" in what else {})}
+    shell = {**stands, "reserve": 1.5, "after_years": years, **({} if "years" in what else lost)}
+    found = verdict(changed(("loads", {"winter": dict.fromkeys(("pinned", "clamped"), shell)}), CREEP))
+    assert (found.level == "good") == known
+
+
 def test_dips_are_no_cause_where_joints_hold_the_net() -> None:
     gaps = {ends: {"max": 2 * off, "max_relative": off} for ends, off in (("pinned", 0.04), ("clamped", 0.03))}
     bound = ("drape", {"method": "bound"})

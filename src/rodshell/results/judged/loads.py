@@ -124,15 +124,16 @@ def _fall(found: LoadedShell, name: str, ends: Ends) -> Iterator[Said]:
 
 def _not_known(found: LoadedShell, name: str, ends: Ends, results: Results) -> Iterator[Said]:
     """What is not known of a shell that is not known to fall, that it moves too far, and that its reserve is less than
-    was asked for."""
+    was asked for. A path that was followed beyond that reserve has shown it."""
     limit, imperfect, years = found.limit_factor or 0.0, found.imperfect_factor, found.after_years
-    if found.limit_kind == NOT_FOLLOWED:
+    enough = found.reserve or inf
+    if found.limit_kind == NOT_FOLLOWED and limit < enough:
         sentence = "not_followed" if limit < 1 else "not_followed: above"
         yield said(sentence, ends, limit, 1, place=name, factor=rounded_down(limit))
-    if found.imperfect_kind == NOT_FOLLOWED:
+    if found.imperfect_kind == NOT_FOLLOWED and (imperfect or 0.0) < enough:
         sentence = "imperfect_unknown: no equilibrium" if imperfect is None else "imperfect_unknown"
         yield said(sentence, ends, imperfect, 1, place=name, factor=rounded_down(imperfect or 0.0))
-    if years is not None and _lost(years):
+    if years is not None and _lost(years) and (_least(years) < enough or _not_found(years)):
         yield said("not_followed: years", ends, _least(years), 1, place=name, factor=rounded_down(_least(years)))
     yield from _deflection(found, name, ends, results)
     asked, least, what = found.reserve or 0.0, *least_carried(found)
@@ -171,6 +172,11 @@ def least_carried(found: LoadedShell) -> tuple[float, str]:
 def _least(found: LoadedShell | AfterYears) -> float:
     known = (found.limit_factor, found.imperfect_factor)
     return min((factor for factor in known if factor is not None), default=inf)
+
+
+def _not_found(years: AfterYears) -> bool:
+    """Whether no equilibrium with imperfections is known."""
+    return years.imperfect_kind == NOT_FOLLOWED and years.imperfect_factor is None
 
 
 def _lost(years: AfterYears) -> bool:
