@@ -282,16 +282,21 @@ def section_keys(words: object) -> Table:
     except ValueError as reason:
         raise ValueError(f"{str(reason).partition(';')[0]}; {wanted}") from None
     thin, wide = sorted((first, second))
+    keys: Table = {"kind": RectangularSection.kind, "width": wide, "height": thin}
     match name.lower():
         case "rod":
-            return {"kind": Circle.kind, "radius": first / 2}
+            keys = {"kind": Circle.kind, "radius": first / 2}
         case "tube":
-            return {"kind": Tube.kind, "radius": first / 2, "thickness": second}
+            keys = {"kind": Tube.kind, "radius": first / 2, "thickness": second}
         case "ellipse":
-            return {"kind": Ellipse.kind, "a": first / 2, "b": second / 2}
+            keys = {"kind": Ellipse.kind, "a": first / 2, "b": second / 2}
         case "lath":
-            return {"kind": RectangularSection.kind, "width": thin, "height": wide}
-    return {"kind": RectangularSection.kind, "width": wide, "height": thin}
+            keys = {"kind": RectangularSection.kind, "width": thin, "height": wide}
+    try:
+        read(SHAPES[keys["kind"]], keys)
+    except InputError as reason:  # such as a wall that has no room in its tube
+        raise ValueError(str(reason)) from None
+    return keys
 
 
 IN_WORDS = Value(section_keys)
