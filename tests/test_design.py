@@ -3,14 +3,17 @@ true of the sizes on both sides."""
 
 import re
 from functools import cache
+from types import SimpleNamespace
 
 import pytest
 
 import rodshell as rs
 from rodshell import design
+from rodshell.case import Case
 from rodshell.case.load_tables import usual_loads
 from rodshell.design import CREEP, Candidate, bracing_of
 from rodshell.errors import InputError, OutOfTimeError
+from rodshell.figures.findings import Finding
 from rodshell.loads.check import Estimate
 from rodshell.rods.section import TRADE_SIZES, Section, Tube, size_text
 
@@ -209,3 +212,30 @@ def test_rods_are_set_closer_only_while_that_helps_a_shell_that_falls_under_its_
     search = design.Search(asked, lambda case, earlier: form, lambda *said: None, lambda sentence: None)
     tried = [each for each in search._grids() if search._stands(*each) is None]
     assert (len({spacing for spacing, _ in tried}) > 2) == helps
+
+
+@pytest.mark.parametrize(
+    ("codes", "thinner"), [(("erection_strength",), True), (("erection_strength", "snaps"), False)]
+)
+def test_thinner_rods_are_tried_for_strength_while_erected_but_not_where_the_shell_snaps_on_the_way(
+    codes: tuple[str, ...], thinner: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a shell that snaps does to its rods hardly depends on their size, and another way spares them."""
+    form = rs.Job.load({**SMALL, **PINNED, **COARSE}).run(until="pop-up")
+    findings = [Finding(code=code, level="check", figure=3.0, limit=1.0) for code in codes]
+    checked = SimpleNamespace(verdict=SimpleNamespace(findings=findings))
+    depths: list[float] = []
+
+    def run(case: Case, earlier: rs.Form | None) -> rs.Form:
+        depths.append(case.build().rod.section.depth)
+        return form
+
+    known = Estimate({"winter": 5.0}, 5.0, 0.9, (0.0, 0.0), 2.0)
+    monkeypatch.setattr(design, "estimate", lambda stages, loads, **how: known)
+    monkeypatch.setattr(design.Search, "_followed", lambda search, tried: (2.0, 0.9, 0.0))
+    monkeypatch.setattr(rs.Form, "finished", lambda form, progress: checked)
+    asked = rs.Job.load({**SMALL, **SNOW, "design.open": ALL}).case
+    search = design.Search(asked, run, lambda *said: None, lambda sentence: None)
+    found = search._stands(0.8, "none")
+    assert (found is None) == thinner
+    assert any(depth <= depths[0] / 3 * 1.01 for depth in depths) == thinner

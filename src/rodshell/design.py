@@ -45,7 +45,8 @@ RISES = 1.1  # times the share of its own weight that a bare shell carried befor
 PRESTRAIN, ROPE_MODULUS = 5e-4, 160e9  # of cables; [Pa] of strands
 ROPE, THIN_ROPE, THIN = 0.006, 0.004, 0.025  # diameters of cables [m]; thin ones are of rods up to that depth
 CREEP: dict[PresetName, float] = {"gfrp": 0.3}  # assumed, of pultruded profiles along their fibres: their makers know
-OF_SIZE = ("strength", "erection_strength", "too_thick", "erection_too_thick", "strength_under_loads")
+OF_SIZE = ("strength", "too_thick", "strength_under_loads")
+OF_SIZE_ERECTED = ("erection_strength", "erection_too_thick")  # but where a shell snaps, it is the way that breaks it
 OF_STIFFNESS = (
     "falls_under_loads", "imperfect", "falls_after_years", "reserve_under_loads", "falls", "reserve", "needs_bracing",
     "strength_of_bracing", "linear_buckling", "low_stiffness", "deflection", "sinks", "unstable",
@@ -181,7 +182,8 @@ class Search:
             form = tried.form.finished(self.progress)
             codes = {finding.code: finding for finding in form.verdict.findings if finding.level != "good"}
             named = ", ".join(codes)
-            if too_thick := [codes[code] for code in OF_SIZE if code in codes]:
+            of_size = OF_SIZE if "snaps" in codes else OF_SIZE + OF_SIZE_ERECTED
+            if too_thick := [codes[code] for code in of_size if code in codes]:
                 worst = max((each.figure or inf) / (each.limit or 1.0) for each in too_thick)
                 self._say(tried, "checks", factor, f"is too thick for its bends ({named})", worst)
                 self.deepest = tried.candidate.section.depth / max(worst, 1.01)

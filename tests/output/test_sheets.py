@@ -21,7 +21,7 @@ from rodshell.output.settings import PAPERS, DrawingStyle
 from rodshell.results import Archive, Results
 from rodshell.results.wording import rounding_of
 from tests.acceptance.cases import ROD
-from tests.output.forms import archive, wished
+from tests.output.forms import archive, form, wished
 from tests.output.hostile import hostile_archive
 from tests.output.sample_archive import sample_archive, table_archive
 
@@ -311,3 +311,24 @@ def test_the_erection_sheet_says_where_the_shell_has_to_be_guided() -> None:
         "The deployment could not be followed: no stage is known between flat and 25 % of it. Between 25 % and 56 % it "
         "has to be guided, and its shape is not known."
     )
+
+
+@pytest.mark.slow
+def test_holes_for_the_ends_of_a_model_can_be_drilled_through_its_support_plan() -> None:
+    """On parts at 1:1 the circles are as far apart as the ends are [mm]."""
+    made = styled(archive("dome"), paper="A4")
+    shell = form("dome").popped[made.final.removeprefix("popped_")]  # type: ignore[index, union-attr]
+    ends = 1e3 * shell.positions[shell.shell.mesh.ends.reshape(-1), :2]
+    parts = [sheet for sheet in sheets(made) if sheet.title.startswith("Support plan 1:1, part ")]
+    assert len(parts) > 4
+    met = set[int]()
+    for part in parts:
+        circles = np.array([mark.at for mark in part.marks])
+        if len(circles) < 2:
+            continue
+        shifts = circles[0] - ends  # one of them puts every circle on an end
+        apart = np.linalg.norm(circles[:, None, None] - (ends + shifts[:, None]), axis=-1)
+        best = int(apart.min(axis=2).max(axis=0).argmin())
+        assert apart[:, best].min(axis=1).max() < 0.02
+        met |= set(apart[:, best].argmin(axis=1).tolist())
+    assert met == set(range(len(ends)))

@@ -1,5 +1,6 @@
 """The pages of docs/start/ and docs/tutorials/ can be followed literally, and find what they say."""
 
+import csv
 import re
 import shlex
 from pathlib import Path
@@ -21,6 +22,7 @@ SAID = {
     "geodesic_boards": ["use 131 %", "88 % of larch's", "carries only 1.5 times", "2.7 times are asked for"],
     "rhino_mesh_to_laths": ["only 78 % of it", "1.66 times its own weight"],
     "fig6_to_sweep": ["3 of 3 designs are finished"],
+    "desk_model": ["18 rods", "57 joints"],
 }
 """What a page quotes of what its commands print."""
 
@@ -46,6 +48,14 @@ def test_a_page_can_be_followed(
         assert words in printed, words
     for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
         exec(block, {})
+    for joint, height in re.findall(r"^\| (\w+/\w+) \| ([\d.]+) \|$", text, re.MULTILINE):
+        assert float(height) == pytest.approx(heights(tmp_path / "out" / "desk")[joint], abs=0.051), joint
+
+
+def heights(folder: Path) -> dict[str, float]:
+    """Of the joints of a result, above the supports [mm]."""
+    with (folder / "schedule" / "joints.csv").open() as rows:
+        return {row["id"]: float(row["final_z_mm"]) for row in csv.DictReader(rows)}
 
 
 def test_every_page_is_followed() -> None:

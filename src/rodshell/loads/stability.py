@@ -23,7 +23,7 @@ from rodshell.loads.structure import Structure
 from rodshell.rods.elements import Elements
 from rodshell.solve.imperfection import imperfect
 from rodshell.solve.load import Load
-from rodshell.solve.load_path import Limit, LoadPath, load_path
+from rodshell.solve.load_path import CLOSE, Limit, LoadPath, load_path
 from rodshell.solve.modes import LinearBuckling, linear_buckling
 
 MOST = 100.0  # times a combination: factors above are not looked for
@@ -133,8 +133,8 @@ def _with_imperfections(
         except ConvergenceError:
             missing = True
             continue
-        # as far as it could be the smallest
-        path = load_path(start, load, most=min(MOST, least), stations=(), progress=progress)
+        # as far as it could be the smallest, by more than a limit is known to
+        path = load_path(start, load, most=min(MOST, least * (1 - CLOSE)), stations=(), progress=progress)
         work += path.factorizations
         if path.limit != "none" and path.factor < least:
             least, kind = path.factor, path.limit

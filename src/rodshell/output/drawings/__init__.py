@@ -100,7 +100,8 @@ def _layouts(archive: Archive) -> dict[str, Layout]:
     if lies_flat(archive):
         layouts["plan"] = sheets.laid_out(partial(flat.flat_drawing, plan), extent, paper, plan.text, true_size=True)
     for name, (compose, extent) in _of_the_shell(archive).items():
-        layouts[name] = sheets.laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
+        text, template = FINER.get(name, 1.0) * plan.text, name == "supports"
+        layouts[name] = sheets.laid_out(compose, extent, paper, text, true_size=template)
     return layouts
 
 

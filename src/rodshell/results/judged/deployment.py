@@ -12,6 +12,8 @@ from rodshell.results.results import Results
 from rodshell.results.wording import percent, too_much
 from rodshell.rods.supports import PINNED, clamped_among
 
+MOST_THINNER = 2.0  # what rods use of their strength while erected, up to which thinner ones are spoken of
+
 
 def unknown_below(results: Results) -> float:
     """Share of the deployment below which nothing is known: 0 all was followed, 1 only the final shape is known."""
@@ -25,8 +27,9 @@ def erection_faults(results: Results) -> Iterator[Said]:
     """What the rods do not withstand on the way that was computed, and other ways, which may spare them."""
     bent, asked = bent_of(results, "deployment"), reserve(results)
     borne = [each.load_factor for each in results.self_weight.values() if each.load_factor is not None]
-    thinner = min(borne, default=asked) >= asked  # else its own weight asks for thicker ones
     used = bent.utilisation
+    # else its own weight asks for thicker ones, or they would have to be so thin that it soon does
+    thinner = min(borne, default=asked) >= asked and (used or 0.0) <= MOST_THINNER
     faults = [*fibre_faults(results, "deployment")]
     if used is not None and used > 1 and holds_while_erected(results, used):
         faults.append(said(
