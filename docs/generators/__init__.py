@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from docs.generators import api, case_file, commands, findings, repository
+from docs.generators import api, case_file, commands, findings, repository, verification
 
 PAGES: dict[str, Callable[[], str]] = {
     "overview.md": lambda: repository.page("README.md"),
@@ -14,6 +14,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "case_file.md": case_file.page,
     "commands.md": commands.page,
     "findings.md": findings.page,
+    "verification.md": verification.page,
     **{f"api_{part}.md": partial(api.page, part) for part in api.PARTS},
 }
 

@@ -1,8 +1,10 @@
 """The acceptance table, row by row: what was measured, and the figure that it must reach."""
 
 import json
+import subprocess
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +41,8 @@ class Row:
 def print_table(name: str, rows: Iterable[Row]) -> int:
     """Print rows as they come and write them to accept/`name`.json; 1 where a figure is missed, for `sys.exit`.
 
-    A row of that file holds case, what, value, bound, unit and reached; it is written when the table is complete.
+    The file has the day, the commit and the rows, each with case, what, value, bound, unit and reached; it is written
+    when the table is complete. The site's page on verification is made of these files.
     """
     entries = []
     for row in rows:
@@ -48,10 +51,21 @@ def print_table(name: str, rows: Iterable[Row]) -> int:
         entries.append({**entry, "unit": row.unit, "reached": bool(row.reached)})
     FOLDER.mkdir(exist_ok=True)
     lines = ",\n".join(f" {json.dumps(entry)}" for entry in entries)
-    (FOLDER / f"{name}.json").write_text(f"[\n{lines}\n]\n")
+    head = f'"date": "{date.today().isoformat()}", "commit": "{_commit()}"'
+    (FOLDER / f"{name}.json").write_text(f'{{{head}, "rows": [\n{lines}\n]}}\n')
     missed = sum(not entry["reached"] for entry in entries)
     print(f"{missed} figures missed" if missed else "every figure reached")
     return 1 if missed else 0
+
+
+def _commit() -> str:
+    """The commit that is checked out, with a plus where the source differs from it."""
+    asked = (("rev-parse", "--short", "HEAD"), ("status", "--porcelain", "--", "src"))
+    commit, changed = (
+        subprocess.run(["git", *words], cwd=FOLDER.parent, capture_output=True, text=True).stdout.strip()
+        for words in asked
+    )
+    return (commit or "unknown") + "+" * bool(changed)
 
 
 _FORMS: dict[str, rs.Form] = {}

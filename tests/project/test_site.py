@@ -8,13 +8,14 @@ import click
 import pytest
 
 import rodshell
-from docs.generators import api, case_file, commands, examples, findings, repository
+from docs.generators import api, case_file, commands, examples, findings, repository, verification
 from rodshell.case import case_keys
 from rodshell.case.case import Case
 from rodshell.case.keys import case_tables
 from rodshell.cli.app import COMMANDS, app
 from rodshell.figures.findings import CODES
 from rodshell.schema import fields_of
+from tests.acceptance import rows
 
 KEYS = set(case_keys()) | set(case_tables())
 
@@ -111,3 +112,18 @@ def test_links_of_the_readme_lead_to_pages_of_the_site() -> None:
             assert target[8:-4] in {"index", *examples.titles()}, target
         elif target.startswith("../"):
             assert (root / "docs" / "generated" / target).resolve().is_relative_to(root / "docs"), target
+
+
+def test_every_row_of_the_acceptance_tables_is_on_the_page_of_verification_and_missed_ones_say_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(rows, "FOLDER", tmp_path / "accept")
+    rows.print_table("rods", [rows.Row("bow", "thrust | off", 0.01, 0.02, "N"), rows.Row("arch", "rise", 3.0, 2.0)])
+    (tmp_path / "Makefile").write_text("accept-rods: ## print the table of the rod alone (a minute)\n")
+    monkeypatch.setattr(verification, "ROOT", tmp_path)
+    page = verification.page()
+    assert re.search(
+        r"^## rods: the rod alone\n\n\d{4}-\d\d-\d\d, commit `\S+`: 2 figures, 1 of them missed\.$", page, re.M
+    )
+    assert "| bow | thrust \\| off | 0.01 N | 0.02 N |" in page
+    assert "| arch | rise | 3 (missed) | 2 |" in page
