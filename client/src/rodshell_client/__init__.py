@@ -14,7 +14,7 @@ import urllib.error
 import urllib.parse
 import urllib.request
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 ANSWER = 20.0  # s within which the server says anything at all
 PAUSES = (0.05, 1.0)  # s between two looks at a job: the first, and the longest
 
