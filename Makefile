@@ -4,8 +4,9 @@
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
 
-lint:      ## ruff, format, and the import contract
+lint:      ## ruff, format, spelling, and the import contract
 	ruff check .
+	typos
 	ruff format --check .
 	lint-imports
 	python .ci/words.py
