@@ -18,7 +18,7 @@ from rodshell.rods.design_strength import DESIGN
 from rodshell.rods.materials import PRESETS
 from tests.acceptance.rows import Row, print_table
 from tests.acceptance.signed_areas import curved_rows, developable_rows, sum_rows
-from tests.acceptance.signed_shells import beam_rows, chance_rows, creep_rows, example_rows, support_rows
+from tests.acceptance.signed_shells import beam_rows, chance_rows, creep_rows, example_rows, snow_rows, support_rows
 
 EXACT = 1e-3
 
@@ -164,7 +164,7 @@ def preset_rows() -> Iterator[Row]:
 
 ROWS = (
     section_rows, preset_rows, support_rows, beam_rows, creep_rows, chance_rows, developable_rows, sum_rows,
-    curved_rows, example_rows,
+    curved_rows, example_rows, snow_rows,
 )  # fmt: skip
 
 

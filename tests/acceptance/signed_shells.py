@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 import rodshell as rs
+from examples import under_snow
 from rodshell.layout.cells import diagonals
 from rodshell.solve.modes import frequencies
 from tests.acceptance.rows import Row
@@ -123,6 +124,15 @@ def example_rows() -> Iterator[Row]:
         shell = form.archive().results.loads["winter"]["pinned"]
         least = min(shell.limit_factor or np.inf, shell.imperfect_factor or np.inf)
         yield Row(f"example {name}", "judged otherwise than good", float(level != "good"), 0, note=f"{least:.2f} times")
+
+
+def snow_rows() -> Iterator[Row]:
+    """Shells of the gallery that are said to stand under snow, with imperfections and after years."""
+    for name in under_snow.SHELLS:
+        found = under_snow.carried(name).values()
+        least, used = min(factor for factor, _ in found), max(used for _, used in found)
+        yield Row(name, "limit short of the reserve of 1.5", max(0.0, 1.5 - least), 0, note=f"{least:.2f} times")
+        yield Row(name, "use of the strength", used, 1)
 
 
 def chance_rows(count: int = SHELLS) -> Iterator[Row]:
