@@ -215,7 +215,6 @@ def _offer(form: "Form", progress: Progress, in_time: ProgressFunction) -> str:
 
 def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_json: bool, quiet: bool) -> int:
     """Save an outcome, print its summary, and return the exit code; not converged wins over not buildable."""
-    from rodshell.results.results import LEVELS
     from rodshell.results.wording import CASE, FORM, FORM_AGAIN
 
     Interruption.check()
@@ -227,6 +226,15 @@ def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_j
     elif not quiet:
         click.echo(outcome.summary.replace(FORM_AGAIN, again))
         say(f"written to {folder}")
+    code = _ended(outcome, folder, again)
+    findings = (outcome.content.get("verdict") or {}).get("findings", ())
+    if not quiet and any(each.get("offers") for each in findings if each["level"] != "good"):
+        say(f"rodshell advise {quote(str(folder))} tries what may help")
+    return code
+
+
+def _ended(outcome: Outcome, folder: Path, again: str) -> int:
+    """The exit code of an outcome; what is not as it was asked for is said."""
     if outcome.refused:
         say(f"error: {outcome.refused}; the form is in {folder}, without its loads")
         return BAD_INPUT
@@ -235,6 +243,9 @@ def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_j
         said = outcome.status if late else f"NOT CONVERGED: {outcome.status}"
         say(f"{said}; partial results are in {folder}")
         return NOT_CONVERGED
+    from rodshell.results.results import LEVELS
+    from rodshell.results.wording import FORM_AGAIN
+
     verdict = outcome.content.get("verdict")
     codes = {"unbuildable": UNBUILDABLE} | ({"unknown": NOT_CONVERGED} if outcome.content.get("pop_up") else {})
     if verdict and (level := verdict["level"]) in codes:
@@ -258,10 +269,15 @@ def _saved(outcome: Outcome, place: "ResultFolder") -> Path:
             raise
         raise KeyboardInterrupt(f"the new result in {place.path} is complete") from None
     except ForeignFileError as error:
-        names = (place.path.with_name(f"{place.path.name}-{k}") for k in count(2))
-        free = next(path for path in names if not path.exists())
+        free = free_name(place.path)
         with open_folder(free) as other:
             shutil.copytree(place.new, other.new, dirs_exist_ok=True)
             other.commit()
         say(f"written to {free} instead: {error}")
         return free
+
+
+def free_name(path: Path) -> Path:
+    """A folder next to `path` that does not exist yet."""
+    names = (path.with_name(f"{path.name}-{k}") for k in count(2))
+    return next(name for name in names if not name.exists())
