@@ -35,7 +35,7 @@ def command(folder: str, most: int, quiet: bool) -> int:
     """
     from rodshell.results import read
     from rodshell.results.folder import open_folder
-    from rodshell.results.offers import offered, standing
+    from rodshell.results.offers import ADVICE, advice_rows, offered, standing
     from rodshell.results.wording import FORM_AGAIN
 
     path = Path(folder)
@@ -60,21 +60,26 @@ def command(folder: str, most: int, quiet: bool) -> int:
                     stage = f"{k} of {len(tries)}: {_options(offer)}"
                     trials.append(_trial(path, verdict, finding, offer, _within(stage, progress)))
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(f"the {len(trials)} offers that were tried are kept in {path}") from None
+            kept = f"what was tried is kept in {path}: {len(trials)} of {len(tries)}"
+            raise KeyboardInterrupt(kept) from None
         finally:
+            helpful = sorted((trial for trial in trials if trial[0].helps), key=lambda trial: standing(trial[1]))
+            tried = [*helpful, *(trial for trial in trials if not trial[0].helps)]
+            results = archive.results.changed(advice=tuple(each for each, _ in tried))
             if trials:
-                kept = archive.results.changed(advice=tuple(tried for tried, _ in trials))
-                place.put("result.json", kept.text())
+                place.put("result.json", results.text())
                 place.commit(keep_others=True)
-    trials.sort(key=lambda trial: (not trial[0].helps, standing(trial[1]) if trial[0].helps else (0, [])))
-    best, _ = trials[0]
     if not quiet:
-        click.echo("\n".join(_table([tried for tried, _ in trials], offers)))
+        rows = [ADVICE, *(row for row in advice_rows(results, verdict) if row[0])]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+        click.echo("\n".join(line.rstrip() for line in lines))
     if len(offers) > most:
         click.echo(f"not tried: {len(offers) - most} more offers (--most {len(offers)})")
-    if not best.helps:
+    if not helpful:
         click.echo("none of them helps")
         return CODES.get(verdict.level, FOUND)
+    best = results.advice[0]
     click.echo(f"{again} {_options(best.offer)} --out {quote(str(free_name(path.resolve())))}")
     return CODES.get(best.level or "", FOUND)
 
@@ -109,21 +114,3 @@ def _trial(folder: Path, before: "Verdict", finding: "Finding", offer: str, prog
 def _options(offer: str) -> str:
     """What an offer adds to the case."""
     return offer.partition("case.toml ")[2]
-
-
-def _table(trials: list["Tried"], findings: dict[str, "Finding"]) -> list[str]:
-    """What was tried, in columns; commands at the end of their lines, as they are long."""
-    from rodshell.results.offers import shown
-    from rodshell.results.results import LEVELS
-
-    rows: list[tuple[str, ...]] = [("", "finding", "before", "after", "limit", "verdict", "option")]
-    for each in trials:
-        finding = findings[each.offer]
-        numbers = [shown(value, finding) for value in (each.before, each.after, finding.limit)]
-        level = LEVELS.get(each.level, "no form") if each.level else "no form"  # type: ignore[call-overload]
-        of = " ".join(filter(None, (each.code, finding.support, finding.place)))
-        rows.append(("tried, helps" if each.helps else "no help", of, *numbers, level, _options(each.offer)))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)][:-1]
-    return [
-        "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[-1]]) for row in rows
-    ]

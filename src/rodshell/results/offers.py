@@ -8,13 +8,13 @@ lead in a circle.
 from collections.abc import Callable, Iterator
 from math import degrees, inf, log, sqrt
 
-from rodshell.figures.findings import RANKS, Finding
+from rodshell.figures.findings import RANKS, Finding, Tried
 from rodshell.figures.form import Layout
 from rodshell.figures.loads import LoadedShell
 from rodshell.results.judged.loads import is_braced, least_carried
-from rodshell.results.judged.own_weight import carried
+from rodshell.results.judged.own_weight import self_weights
 from rodshell.results.judged.stress import bent_of
-from rodshell.results.results import Results, Verdict
+from rodshell.results.results import LEVELS, Results, Verdict
 from rodshell.results.sizes_sold import sizes_sold
 from rodshell.results.wording import FORM_AGAIN, figure, rounded, rounded_down
 from rodshell.rods.section import SHAPES, Section, size_text
@@ -95,7 +95,7 @@ def bracing_keys(name: str, depth: float) -> dict[str, str]:
 
 
 def _options(results: Results, finding: Finding, remedy: str) -> Iterator[str]:
-    """The options of a remedy, as far as the case has them."""
+    """The options of a remedy that the case has."""
     layout, ends, short = results.layout, set(results.pop_up), (finding.limit or 0.0) / (finding.figure or inf)
     square = layout is not None and layout.kind == "chebyshev" and not results.seams
     spacing = layout.spacing if layout and layout.kind != "curves" else None
@@ -165,6 +165,7 @@ def _spacing(layout: Layout, spacings: list[float]) -> str:
 
 # What an offer came to
 
+ADVICE = ("", "finding", "before", "after", "limit", "verdict", "option")
 CARRIED = ("falls_under_loads", "imperfect", "falls_after_years", "reserve_under_loads")
 OF_LOADS: dict[str, Callable[[LoadedShell], float | None]] = {
     **dict.fromkeys(CARRIED, lambda shell: least_carried(shell)[0]),
@@ -175,6 +176,20 @@ OF_LOADS: dict[str, Callable[[LoadedShell], float | None]] = {
 }
 OF_WEIGHT, OF_BENDS = ("falls", "reserve"), ("strength", "too_thick", "erection_strength", "erection_too_thick")
 MEASURED = {*OF_LOADS, *OF_WEIGHT, *OF_BENDS, "off_target"}  # codes whose figures are known without a finding
+
+
+def advice_rows(results: Results, verdict: Verdict) -> list[tuple[str, ...]]:
+    """What is offered for the findings of a result, what was tried first, under `ADVICE`."""
+    tried, rows = {each.offer: each for each in results.advice}, list[tuple[str, ...]]()
+    offers = offered(verdict)
+    for offer in sorted(offers, key=lambda each: [*tried, *offers].index(each)):
+        finding, each = offers[offer], tried.get(offer) or Tried(offer=offer, code="", before=offers[offer].figure)
+        of = " ".join(filter(None, (finding.code, finding.support, finding.place)))
+        figures = (shown(value, finding) for value in (each.before, each.after, finding.limit))
+        level = next((words for name, words in LEVELS.items() if name == each.level), "no form" if each.code else "")
+        mark = "" if not each.code else "tried, helps" if each.helps else "tried, no help"
+        rows.append((mark, of, *figures, level, offer.removeprefix(f"{FORM_AGAIN} ")))
+    return rows
 
 
 def standing(verdict: Verdict) -> tuple[int, list[tuple[int, float]]]:
@@ -207,7 +222,7 @@ def figure_of(results: Results, finding: Finding) -> float | None:
     code, known = finding.code, list[float | None]()
     ends = [finding.support] if finding.support in results.pop_up else list(results.pop_up)
     if code in OF_WEIGHT:
-        weighed = carried(results, ends).values()
+        weighed = self_weights(results, ends).values()
         known = [inf if each.load_factor is None else each.load_factor for each in weighed if each.limit]
     elif code in OF_LOADS and (code not in CARRIED or _rises(finding)):
         known = [OF_LOADS[code](shell) for name, _, shell in results.loaded_shells() if name == finding.place]
