@@ -41,20 +41,21 @@ def test_the_command_for_the_best_comes_to_what_is_said_of_it(
         path: path.read_bytes() for path in folder.rglob("*.*") if path.name not in ("result.json", "manifest.json")
     }
     capsys.readouterr()
-    assert main(["advise", "a thin one"]) == 0
-    said = lines(capsys)
+    assert main(["advise", "a thin one", "--most", "2"]) == 0
+    *said, left, command = lines(capsys)
+    assert left == "not tried: 3 more offers (--most 5)"
     assert said[0].startswith("pavilion: Check, unloaded: with pinned ends the shell does not stand")
     assert said[1].split() == ["finding", "before", "after", "limit", "verdict", "option"]
     after = json.loads((folder / "result.json").read_text())
     advice = after.pop("advice")
     assert after == {key: value for key, value in before.items() if key != "advice"}
     assert all(path.read_bytes() == content for path, content in files.items())
-    assert len(advice) == len(said) - 3
-    assert [line.startswith("tried, helps") for line in said[2:-1]] == [each["helps"] for each in advice]
+    assert len(advice) == len(said) - 2 == 2
+    assert [line.startswith("tried, helps") for line in said[2:]] == [each["helps"] for each in advice]
     best = advice[0]
     assert best["helps"]
-    assert best["offer"].removeprefix("rodshell form case.toml ") in said[-1]
-    assert main([*shlex.split(said[-1])[1:], "--only", "csv", "-q"]) == 0
+    assert best["offer"].removeprefix("rodshell form case.toml ") in command
+    assert main([*shlex.split(command)[1:], "--only", "csv", "-q"]) == 0
     found = read("a thin one-2")
     assert found.verdict.headline == best["said"]
     factors = [each.load_factor or 0.0 for each in found.results.self_weight.values()]

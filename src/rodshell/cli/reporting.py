@@ -147,6 +147,7 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
     """
     from rodshell.output.files import reserved, save
     from rodshell.results.folder import open_folder
+    from rodshell.results.offers import offered
 
     names = ["result.json", "states.npz", *_names_of(case), *reserved(output.kinds)]
     with open_folder(output.out or default_folder(name), reserved=names, force=output.force) as place:
@@ -172,7 +173,10 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
             lambda folder: save(archive, folder, output.kinds, more=_pictures(form), progress=in_time),
             refused,
         )
-        return deliver(outcome, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+        code = deliver(outcome, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+        if place.committed and not output.quiet and offered(archive.verdict):
+            say(f"rodshell advise {quote(str(place.path))} tries what may help")
+        return code
 
 
 def default_folder(name: str) -> Path:
@@ -215,6 +219,7 @@ def _offer(form: "Form", progress: Progress, in_time: ProgressFunction) -> str:
 
 def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_json: bool, quiet: bool) -> int:
     """Save an outcome, print its summary, and return the exit code; not converged wins over not buildable."""
+    from rodshell.results.results import LEVELS
     from rodshell.results.wording import CASE, FORM, FORM_AGAIN
 
     Interruption.check()
@@ -226,15 +231,6 @@ def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_j
     elif not quiet:
         click.echo(outcome.summary.replace(FORM_AGAIN, again))
         say(f"written to {folder}")
-    code = _ended(outcome, folder, again)
-    findings = (outcome.content.get("verdict") or {}).get("findings", ())
-    if not quiet and any(each.get("offers") for each in findings if each["level"] != "good"):
-        say(f"rodshell advise {quote(str(folder))} tries what may help")
-    return code
-
-
-def _ended(outcome: Outcome, folder: Path, again: str) -> int:
-    """The exit code of an outcome; what is not as it was asked for is said."""
     if outcome.refused:
         say(f"error: {outcome.refused}; the form is in {folder}, without its loads")
         return BAD_INPUT
@@ -243,9 +239,6 @@ def _ended(outcome: Outcome, folder: Path, again: str) -> int:
         said = outcome.status if late else f"NOT CONVERGED: {outcome.status}"
         say(f"{said}; partial results are in {folder}")
         return NOT_CONVERGED
-    from rodshell.results.results import LEVELS
-    from rodshell.results.wording import FORM_AGAIN
-
     verdict = outcome.content.get("verdict")
     codes = {"unbuildable": UNBUILDABLE} | ({"unknown": NOT_CONVERGED} if outcome.content.get("pop_up") else {})
     if verdict and (level := verdict["level"]) in codes:

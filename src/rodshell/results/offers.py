@@ -53,6 +53,10 @@ REMEDIES = {
 }  # fmt: skip
 """What may mend a finding, by its code, that which helps most first; no option mends the others."""
 
+FIXED = {
+    "inside": "--strength.service_class 1", "outside": "--strength.service_class 3", "bolted": "--joint.kind pin",
+    "imperfect": '--stability.imperfection "span/500"', "snow": '--snow "0.5 kN/m2"', "stages": "--checks.stages 24",
+}  # fmt: skip
 BRACINGS = {
     "none": {"kind": "none"},
     "cables": {
@@ -100,16 +104,8 @@ def _options(results: Results, finding: Finding, remedy: str) -> Iterator[str]:
     square = layout is not None and layout.kind == "chebyshev" and not results.seams
     spacing = layout.spacing if layout and layout.kind != "curves" else None
     pinned = PINNED.name in ends and finding.support != CLAMPED.name
-    fixed = {
-        "inside": "--strength.service_class 1",
-        "outside": "--strength.service_class 3",
-        "imperfect": '--stability.imperfection "span/500"',
-        "snow": '--snow "0.5 kN/m2"',
-        "stages": "--checks.stages 24",
-        "bolted": "--joint.kind pin",
-    }
-    if remedy in fixed:
-        yield fixed[remedy]
+    if remedy in FIXED:
+        yield FIXED[remedy]
     elif remedy == "thicker":  # the next size, and that of which as much as is asked for is carried, by similarity
         yield from _sizes(results, 1.0, thicker=True)
         yield from _sizes(results, sqrt(min(max(short, 1.0), THICKER**2)), thicker=True)
