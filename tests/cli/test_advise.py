@@ -43,7 +43,7 @@ def test_the_command_for_the_best_comes_to_what_is_said_of_it(
     capsys.readouterr()
     assert main(["advise", "a thin one", "--most", "2"]) == 0
     *said, left, command = lines(capsys)
-    assert left == "not tried: 3 more offers (--most 5)"
+    assert left.startswith("not tried: ")
     assert said[0].startswith("pavilion: Check, unloaded: with pinned ends the shell does not stand")
     assert said[1].split() == ["finding", "before", "after", "limit", "verdict", "option"]
     after = json.loads((folder / "result.json").read_text())

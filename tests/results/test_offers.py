@@ -14,6 +14,7 @@ import rodshell as rs
 from docs.generators.findings import WHAT_TO_DO
 from rodshell.case import Case
 from rodshell.cli import form
+from rodshell.cli.advise import case_of
 from rodshell.figures.findings import CODES, RANKS, Finding, level_of
 from rodshell.figures.sentences import SENTENCES
 from rodshell.results import Archive, Verdict
@@ -52,10 +53,8 @@ def made(name: str) -> Archive:
 
 def taken(case: Path, offer: str) -> Case:
     """The case that the command line makes of an offer."""
-    program, command, name, *options = shlex.split(offer)
-    assert (program, command, name) == ("rodshell", "form", "case.toml")
-    with form.command.make_context("form", [str(case), *options]) as context:
-        return form.asked(**context.params)
+    assert shlex.split(offer)[:3] == ["rodshell", "form", "case.toml"]
+    return case_of(case, offer)
 
 
 @pytest.mark.parametrize("name", ["tubes", *(pytest.param(name, marks=pytest.mark.slow) for name in [*CASES][1:])])
@@ -104,6 +103,19 @@ def test_thinner_rods_are_as_thin_as_their_bends_ask_for(figure: float, limit: f
     """Of tubes of 32 mm: 26.7, 31.4 and 16.8 mm are asked for, and the next thinner ones that are sold are offered."""
     first, *_ = offers_of(made("tubes").results, Finding(code="strength", support="pinned", figure=figure, limit=limit))
     assert first == f'{FORM_AGAIN} --rod "{size} mm"'
+
+
+def test_a_mesh_that_is_too_coarse_offers_the_edge_that_its_warning_names() -> None:
+    warned = rs.Job.load("pavilion", COARSE | {"layout.edge": "2 m"}).run().verdict
+    sentence, finding = next(
+        (reason, each) for reason, each in zip(warned.reasons, warned.findings, strict=True) if each.code == "warning"
+    )
+    assert finding.offers == (f'{FORM_AGAIN} --edge "{sentence.rpartition(" of ")[2]}"',)
+
+
+def test_a_deployment_that_was_not_asked_for_is_offered() -> None:
+    of = Finding(code="not_checked")
+    assert offers_of(made("tubes").results, of) == (f"{FORM_AGAIN} --checks.stages 8",)
 
 
 def verdict_of(draw: random.Random) -> Verdict:

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rodshell.case import Case
 from rodshell.cli import form
+from rodshell.cli.app import app
 from rodshell.cli.options import QUIET
 from rodshell.cli.reporting import FOUND, NOT_CONVERGED, UNBUILDABLE, Progress, compile_before_first, free_name
 from rodshell.errors import InputError, RodshellError
@@ -97,9 +99,7 @@ def _trial(folder: Path, before: "Verdict", finding: "Finding", offer: str, prog
 
     tried = Tried(offer=offer, code=finding.code, before=finding.figure, helps=False)
     try:
-        with form.command.make_context("form", [str(folder / "case.toml"), *split(_options(offer))]) as context:
-            case = form.asked(**context.params)
-        found = Job.of_case(case).run(progress=progress)
+        found = Job.of_case(case_of(folder / "case.toml", offer)).run(progress=progress)
         if found.known_loaded and found.known_loaded.refused:
             raise InputError(found.known_loaded.refused)
         results = found.archive().results
@@ -109,6 +109,13 @@ def _trial(folder: Path, before: "Verdict", finding: "Finding", offer: str, prog
     return tried.changed(
         after=figure_of(results, finding), level=now.level, helps=helps(before, finding, results), said=now.headline
     ), now  # fmt: skip
+
+
+def case_of(case: Path, offer: str) -> Case:
+    """The case that the command line of an offer gives."""
+    words = [str(case), *split(_options(offer))]
+    with form.command.make_context("form", words, **app.context_settings) as context:
+        return form.asked(**context.params)
 
 
 def _options(offer: str) -> str:

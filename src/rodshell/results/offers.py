@@ -5,6 +5,7 @@ a whole by `standing`: in that one order no two results are each better than the
 lead in a circle.
 """
 
+import re
 from collections.abc import Callable, Iterator
 from math import degrees, inf, log, sqrt
 
@@ -39,6 +40,7 @@ REMEDIES = {
     "needs_bracing": "thicker clamped",
     "no_imperfections": "imperfect",
     "no_loads": "snow",
+    "not_checked": "deployed",
     "not_computed": "finer searched",
     "not_followed": f"finer {WEIGHT}",
     "not_spliced": "closer",
@@ -69,16 +71,20 @@ BRACINGS = {
 """Keys of bracing: ropes both ways to the supports, or a third layer of the grid's laths."""
 THIN, THIN_ROPE = 0.025, "rod 4"  # rods up to that depth [m] have such cables
 
+NAMED_EDGE = re.compile(r"layout\.edge of ([\d.]+ m{1,2})\b")  # in warnings of a mesh that is too coarse
 CLOSER, WIDER, FINER = 0.75, 1.3, 0.5  # of a spacing; of an edge
 THICKER, STEP, SAME = 2.0, 1.25, 0.999  # times a depth: at most, at once; where no sizes are known; as good as that
 USUAL = {PINNED.name, CLAMPED.name}  # other supports are given in the case file alone
 BETTER = 0.01  # of a figure: by less it has not changed
 
 
-def offers_of(results: Results, finding: Finding) -> tuple[str, ...]:
+def offers_of(results: Results, finding: Finding, sentence: str = "") -> tuple[str, ...]:
     """The commands that may mend a finding, to be run in the folder of the result; none of a table of rods."""
-    remedies = REMEDIES.get(finding.code, "").split() if results.target else ()
-    options = [option for remedy in remedies for option in _options(results, finding, remedy)]
+    if results.target is None:
+        return ()
+    remedies = REMEDIES.get(finding.code, "").split()
+    options = [f'--edge "{edge}"' for edge in NAMED_EDGE.findall(sentence)]
+    options += [option for remedy in remedies for option in _options(results, finding, remedy)]
     return tuple(f"{FORM_AGAIN} {option}" for option in dict.fromkeys(options))
 
 
@@ -117,6 +123,8 @@ def _options(results: Results, finding: Finding, remedy: str) -> Iterator[str]:
         yield f'--edge "{rounded(1e3 * FINER * layout.edge)} mm"'
     elif remedy == "rotated" and layout and square:
         yield f'--rotate "{(degrees(layout.rotate or 0.0) + 45) % 90:.3g} deg"'
+    elif remedy == "deployed" and results.deployment is None and ends <= USUAL:
+        yield "--checks.stages 8" + " --ends both" * (PINNED.name not in ends)
     elif remedy == "searched" and square:
         yield "--anchor auto --rotate auto"
     elif remedy == CLAMPED.name and pinned and ends <= USUAL:

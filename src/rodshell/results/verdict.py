@@ -109,7 +109,7 @@ def _verdict(results: Results, level: Level, reasons: Iterable[Said]) -> Verdict
         finding = each.finding
         far = finding.code == "off_target" and (finding.figure or 0.0) > FAR_OFF
         alone = "unbuildable" if far else level_of(finding.code)
-        offers = tuple(dict.fromkeys([*finding.offers, *offers_of(results, finding)]))
+        offers = tuple(dict.fromkeys([*finding.offers, *offers_of(results, finding, each)]))
         once.setdefault(str(each), finding.changed(level=min(alone, level, key=RANKS.index), offers=offers))
     stands_alone = level in ("good", "check") and not results.loads
     return Verdict(
