@@ -9,7 +9,7 @@ import click
 from rodshell.case import Case
 from rodshell.cli import form
 from rodshell.cli.app import app
-from rodshell.cli.options import QUIET
+from rodshell.cli.options import FORCE, QUIET
 from rodshell.cli.reporting import FOUND, NOT_CONVERGED, UNBUILDABLE, Progress, compile_before_first, free_name
 from rodshell.errors import InputError, RodshellError
 from rodshell.progress import Progress as ProgressFunction
@@ -25,8 +25,9 @@ CODES = {"unbuildable": UNBUILDABLE, "unknown": NOT_CONVERGED}
 @click.command()
 @click.argument("folder", metavar="DIR")
 @click.option("--most", type=int, default=10, metavar="N", help="How many offers are tried at most; default 10.")
+@FORCE
 @QUIET
-def command(folder: str, most: int, quiet: bool) -> int:
+def command(folder: str, most: int, force: bool, quiet: bool) -> int:
     """Try what the findings of an earlier result offer, and say what helps.
 
     DIR is a result of rodshell form, refine or check. Its offers are formed one by one, those of its gravest finding
@@ -54,7 +55,7 @@ def command(folder: str, most: int, quiet: bool) -> int:
     if not (path / "case.toml").is_file():
         raise InputError(f"{folder} has no case.toml that could be run again: give a result of rodshell form")
     trials, tries = list[Trial](), [*offers.items()][:most]
-    with open_folder(path, reserved=["result.json"]) as place:
+    with open_folder(path, reserved=["result.json"], force=force) as place:
         compile_before_first(quiet=quiet)
         try:
             with Progress(quiet=quiet) as progress:
