@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from rodshell.case import load_case
 from rodshell.cli import advise, main
 from rodshell.results import read
 from tests.acceptance.advised import FOUND, advised
@@ -106,10 +107,22 @@ def test_an_offer_that_cannot_be_formed_is_no_help_and_says_why(formed: Callable
     folder = formed("thin", *THIN)
     verdict = read(folder).verdict
     finding = verdict.findings[0]
-    for option, why in (('--rod "tube 3x32"', "wall"), ("--spacings 1", "No such option"), ("--base 9", "base")):
+    for option, why in (
+        ('--rod "tube 3x32"', "wall"),
+        ("--spacings 1", "No such option"),
+        ("--base 9", "base"),
+        ('--rod "', "cannot be read"),
+    ):
         tried, _ = advise._trial(folder, verdict, finding, f"rodshell form case.toml {option}", lambda *_: None)
         assert (tried.helps, tried.level, tried.after) == (False, None, None)
         assert why in tried.said
+
+
+def test_frames_of_a_fall_are_not_written_by_a_trial(tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text(load_case("hemisphere", {"drape.method": "paper", "drape.frames": "fall"}).to_toml())
+    assert load_case(str(case)).drape.frames == "fall"
+    assert advise.case_of(case, "rodshell form case.toml --ends pinned").drape.frames is None
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """`rodshell advise`: what the findings of a result offer, tried one after the other."""
 
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote, split
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from rodshell.cli.options import FORCE, QUIET
 from rodshell.cli.reporting import FOUND, NOT_CONVERGED, UNBUILDABLE, Progress, compile_before_first, free_name
 from rodshell.errors import InputError, RodshellError
 from rodshell.progress import Progress as ProgressFunction
+from rodshell.units import shown
 
 if TYPE_CHECKING:
     from rodshell.figures.findings import Finding, Tried
@@ -113,10 +115,14 @@ def _trial(folder: Path, before: "Verdict", finding: "Finding", offer: str, prog
 
 
 def case_of(case: Path, offer: str) -> Case:
-    """The case that the command line of an offer gives."""
-    words = [str(case), *split(_options(offer))]
-    with form.command.make_context("form", words, **app.context_settings) as context:
-        return form.asked(**context.params)
+    """The case that the command line of an offer gives, without the frames of a fall, which are files."""
+    try:
+        words = split(_options(offer))
+    except ValueError as reason:
+        raise InputError(f"the offer {shown(offer)} cannot be read: {reason}") from None
+    with form.command.make_context("form", [str(case), *words], **app.context_settings) as context:
+        found = form.asked(**context.params)
+    return replace(found, drape=replace(found.drape, frames=None))
 
 
 def _options(offer: str) -> str:
