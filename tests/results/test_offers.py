@@ -118,6 +118,14 @@ def test_a_deployment_that_was_not_asked_for_is_offered() -> None:
     assert offers_of(made("tubes").results, of) == (f"{FORM_AGAIN} --checks.stages 8",)
 
 
+@pytest.mark.parametrize(
+    ("support", "offered"), [("pinned", ["clamped"]), ("clamped", ["pinned"]), (None, ["clamped"])]
+)
+def test_ends_are_offered_that_a_finding_is_not_about(support: str | None, offered: list[str]) -> None:
+    found = offers_of(made("tubes").results, Finding(code="strength", support=support, figure=1.2, limit=1.0))
+    assert [offer.split()[-1] for offer in found if "--ends" in offer] == offered
+
+
 def verdict_of(draw: random.Random) -> Verdict:
     codes = draw.sample(["falls", "strength", "reserve", "off_target", "contact", "snaps", "no_loads"], 3)
     findings = tuple(
