@@ -1,5 +1,5 @@
 # Commands of the project; `make` alone lists them.
-.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed accept-hosts attack release-checks ci-full house paper pictures bench bench-quick bench-rods docs
+.PHONY: help lint words types test test-fast test-indices accept accept-targets accept-rods accept-output accept-joints accept-paper accept-verdict accept-refine accept-house accept-loads accept-sweep accept-studio accept-designed accept-advised accept-drawn accept-lattices accept-signed accept-hosts attack release-checks ci-full house paper pictures bench bench-quick bench-rods docs
 
 help:
 	@grep -E '^[a-z-]+:.*##' Makefile | sed 's/:.*##/:/'
@@ -53,6 +53,9 @@ accept-verdict: ## print the table of invalid inputs and verdicts (some minutes)
 accept-loads: ## print the table of loads and stability
 	python -m tests.acceptance.loads
 
+accept-advised: ## print the table of shells that are advised, three steps each (an hour)
+	python -m tests.acceptance.advised
+
 accept-designed: ## print the table of roofs that are designed to their loads (an hour)
 	python -m tests.acceptance.designed
 
@@ -92,7 +95,7 @@ ci-full:   ## what .ci/run does, every Python, what a release needs, and every a
 	.ci/versions
 	.ci/release
 	$(MAKE) --keep-going test-indices accept accept-targets accept-rods accept-joints accept-output accept-paper accept-verdict \
-		accept-house accept-loads accept-refine accept-sweep accept-studio accept-designed accept-drawn accept-lattices accept-signed \
+		accept-house accept-loads accept-refine accept-sweep accept-studio accept-designed accept-advised accept-drawn accept-lattices accept-signed \
 		accept-hosts attack
 
 house:     ## print the source by room, before and after: statements, lines, public names, files; circles, long files

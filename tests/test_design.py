@@ -11,10 +11,11 @@ import rodshell as rs
 from rodshell import design
 from rodshell.case import Case
 from rodshell.case.load_tables import usual_loads
-from rodshell.design import CREEP, Candidate, bracing_of
+from rodshell.design import CREEP
 from rodshell.errors import InputError, OutOfTimeError
 from rodshell.figures.findings import Finding
 from rodshell.loads.check import Estimate
+from rodshell.results.offers import bracing_keys
 from rodshell.rods.section import TRADE_SIZES, Section, Tube, size_text
 
 ALL = "section, bracing, spacing"
@@ -140,7 +141,7 @@ def made_of(section: Section) -> dict[str, object]:
 
 
 def test_thin_rods_get_thin_ropes() -> None:
-    ropes = [bracing_of(Candidate(Tube(radius, 0.0025), "cables", 0.5)) for radius in (0.01, 0.016)]
+    ropes = [rs.Job.load("pavilion", bracing_keys("cables", depth)).case.bracing for depth in (0.02, 0.032)]
     assert [rope.rod.section.depth for rope in ropes] == pytest.approx([0.004, 0.006])  # type: ignore[union-attr]
     assert all(rope.prestrain == 5e-4 for rope in ropes)  # type: ignore[union-attr]
 

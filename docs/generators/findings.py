@@ -11,7 +11,8 @@ HEAD = """# Each finding, and what to do
 
 A verdict consists of findings, and is as grave as the gravest of them: *good*, *check*, *unbuildable*, or *unknown*
 where a computation did not end. A finding has a code, in `result.json` and in Python (`form.verdict.findings`); the
-dots below stand for figures of the shell.
+dots below stand for figures of the shell. Where options may mend it, a finding offers them as commands to paste
+(`offers`); `rodshell advise DIR` tries those of a result, and says which of them help.
 
 """
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from math import inf
 
 from rodshell.case import Case
-from rodshell.case.load_tables import BracingKinds, NoBracing
+from rodshell.case.load import changed_case
 from rodshell.case.rod_tables import RodTable
 from rodshell.case.stage_tables import DesignTable, LayoutTable
 from rodshell.errors import ConvergenceError, InputError, NetLimitError, OutOfTimeError
@@ -23,13 +23,13 @@ from rodshell.figures.design import Design, DesignStep, KnownBy
 from rodshell.form import Form
 from rodshell.formfinding.finite_sections import CLOSE
 from rodshell.loads.check import Estimate, check_shells, estimate
-from rodshell.loads.settings import Cables, Laths
 from rodshell.loads.stability import MOST
 from rodshell.progress import Progress
 from rodshell.results.judged.loads import least_carried
+from rodshell.results.offers import bracing_keys
 from rodshell.results.wording import percent, rounded, rounded_down
 from rodshell.rods.materials import Material, PresetName
-from rodshell.rods.section import TRADE_SIZES, Circle, GivenSection, Rod, Section, size_text
+from rodshell.rods.section import TRADE_SIZES, GivenSection, Rod, Section, size_text
 from rodshell.rods.supports import BOTH
 from rodshell.schema import read
 
@@ -42,8 +42,6 @@ GAIN = 1.5  # exponent of the spacing's inverse by which factors grow at most: .
 LIKELY = 1.15  # a path is followed if the reserve may be reached by so much more than is estimated
 APART = 0.6  # of a spacing at which a bracing breaks the shell, or pulls it out of its shape: the next one to try
 RISES = 1.1  # times the share of its own weight that a bare shell carried before: less has not helped
-PRESTRAIN, ROPE_MODULUS = 5e-4, 160e9  # of cables; [Pa] of strands
-ROPE, THIN_ROPE, THIN = 0.006, 0.004, 0.025  # diameters of cables [m]; thin ones are of rods up to that depth
 CREEP: dict[PresetName, float] = {"gfrp": 0.3}  # assumed, of pultruded profiles along their fibres: their makers know
 OF_SIZE = ("strength", "too_thick", "strength_under_loads")
 OF_SIZE_ERECTED = ("erection_strength", "erection_too_thick")  # but where a shell snaps, it is the way that breaks it
@@ -343,7 +341,7 @@ class Search:
             assert isinstance(case.layout, LayoutTable)
             case = replace(case, layout=replace(case.layout, spacing=(candidate.spacing,) * 2))
         if "bracing" in asked:
-            case = replace(case, bracing=bracing_of(candidate))
+            case = changed_case(case, bracing_keys(candidate.bracing, candidate.section.depth))
         return case
 
     def _prepared(self) -> tuple[Case, Material | None, tuple[Section | GivenSection, ...], Candidate]:
@@ -382,19 +380,6 @@ def _place(tried: Tried) -> str:
 
 def _flatter(tried: Tried) -> str:
     return f"make it flatter than {rounded(tried.known.radius * tried.used)} m there"
-
-
-def bracing_of(candidate: Candidate) -> BracingKinds:
-    """The bracing of a candidate: none, ropes both ways to the supports, or a third layer of its laths."""
-    if candidate.bracing == "none":
-        return NoBracing()
-    if candidate.bracing == "laths":
-        return Laths()
-    if candidate.bracing == "laths both ways":
-        return Laths(pattern="both")
-    steel = Material.preset("spring-steel", youngs_modulus=ROPE_MODULUS)
-    rope = Circle((ROPE if candidate.section.depth > THIN else THIN_ROPE) / 2)
-    return Cables(pattern="both", prestrain=PRESTRAIN, ends_at="supports", rod=Rod(rope, steel))
 
 
 def _require(asked: Case) -> None:

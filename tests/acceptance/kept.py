@@ -64,6 +64,7 @@ SYMMETRIC = JOBS.keys() - {"freeform", "oculus"}  # whose shells have mirror ima
 
 _NEW, _AS_ONE = "a new key", "all patches are one shell, carry their weight on one path, and are searched together"
 _TRADE = "offers name a section as the trade does"
+_OFFERS = "every finding that options can mend has offers"
 _CELLS = "nodes take exact cells of the target, and their loads with them"
 CHANGED_ON_PURPOSE: dict[str, str] = {
     "*.flat_state": _NEW,
@@ -74,7 +75,7 @@ CHANGED_ON_PURPOSE: dict[str, str] = {
     "table.rods[[]*[]].offset": "a rod of a table has no offset",
     "*.snow": _NEW,
     "*.verdict.unloaded": _NEW,
-    "freeform.verdict.findings*.offers*": _TRADE,
+    "*.verdict.findings*.offers*": _OFFERS,
     "freeform.verdict.reasons*": _TRADE,
     "bumps.ends_in_the_air.*": _CELLS,
     "bumps.loads.*": _CELLS,

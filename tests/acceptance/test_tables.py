@@ -75,8 +75,12 @@ ELSEWHERE = {
     "sweep": "test_sweep_rows.py",
     "targets": "test_any_target.py",
 }
-HOURS = {"designed": "tests/test_design.py", "hosts": "tests/output/test_opensees.py"}
-"""Tables without a cheap row, the second as it needs OpenSees, and what tests the same in small."""
+HOURS = {
+    "advised": "tests/cli/test_advise.py",
+    "designed": "tests/test_design.py",
+    "hosts": "tests/output/test_opensees.py",
+}
+"""Tables without a cheap row, the last as it needs OpenSees, and what tests the same in small."""
 
 
 @pytest.mark.parametrize(("table", "number"), [(table, n) for table, rows in CHEAP.items() for n in range(len(rows))])

@@ -30,11 +30,11 @@ STRANGE = (
 OPTIONS = (
     "--out", "--only", "--time-limit", "--force", "--json", "-q", "--dry-run", "--report", "--retry", "--address",
     "--loads", "--ends", "--unit", "--seed", "--jobs", "--target", "--generations", "--host", "--port", "--folder",
-    "--no-browser", "--schema", *(f"--{key}" for key in case_keys()),
+    "--no-browser", "--schema", "--most", *(f"--{key}" for key in case_keys()),
 )  # fmt: skip
 BEGINS = (
     *(f"{command}.run_and_deliver" for command in ("form", "refine", "check", "popup")),
-    *(f"{command}.compile_before_first" for command in ("paper", "sweep", "optimise", "warmup")),
+    *(f"{command}.compile_before_first" for command in ("paper", "sweep", "optimise", "warmup", "advise")),
 )
 
 

@@ -45,6 +45,7 @@ class FakeArchive:
         self.results = Results.model_validate(
             {"format": "rodshell-result", "status": status, "verdict": verdict, **popped}
         )
+        self.verdict = self.results.verdict
         self.case_toml = case_toml
 
     def save(self, folder: ResultFolder, kinds: list[str] | None = None, **options: Any) -> None:

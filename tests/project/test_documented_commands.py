@@ -20,6 +20,7 @@ ROOT = Path(__file__).parents[2]
 QUICK = {
     "form": ["--only", "csv", "--checks.stages", "0", "--pop_up.ends", "clamped"],
     "refine": ["--only", "csv", "--checks.stages", "0"],
+    "advise": ["--most", "1"],
 }
 """What is added to a command so that it does no more than it must."""
 

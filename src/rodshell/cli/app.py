@@ -17,6 +17,7 @@ COMMANDS = {
     "refine": "Bring a form nearer to its target, and accept only what can be built.",
     "popup": "Pop up a table of rods, or an earlier result, from flat.",
     "check": "Check a case, or an earlier result, under loads.",
+    "advise": "Try what the findings of an earlier result offer, and say what helps.",
     "export": "Write drawings, schedules, models or the report of an earlier result again.",
     "studio": "Design a gridshell on a live page in the browser.",
     "sweep": "Compute many designs: combinations or samples of the values of some keys.",

@@ -21,7 +21,7 @@ ALIASES = {path: f"--{path.partition('.')[2]}" for path in (
     "target.radius", "target.formula", "target.unit", "target.up", "target.base", "target.boundary",
     "layout.rods", "layout.spacing", "layout.length", "layout.edge", "layout.rotate",
     "drape.anchor", "drape.method", "drape.objective", "refine.vary",
-)} | {"rod.section": "--rod"}  # fmt: skip
+)} | {"rod.section": "--rod", "pop_up.ends": "--ends"}  # fmt: skip
 
 
 def _parameter(path: str) -> str:

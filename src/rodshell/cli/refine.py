@@ -19,11 +19,8 @@ VARY = "taper"  # where neither the command nor the case says
 
 @click.command(cls=CaseCommand, params=case_options(), epilog=UNITS)
 @click.argument("name", metavar="NAME|CASE.toml|SURFACE|DIR")
-@click.option(
-    "--ends", metavar="pinned|clamped", help="Supports of the refined shell; default: as the case says, or pinned."
-)
 @output_options("Folder for the results; default out/NAME-refined.")
-def command(name: str, ends: str | None, output: RunOptions, **values: Any) -> int:
+def command(name: str, output: RunOptions, **values: Any) -> int:
     """Bring a form nearer to its target: vary its rods, and accept only what can be built.
 
     NAME, CASE.toml and SURFACE are those of rodshell form; DIR is an earlier result, whose case is run again. --vary
@@ -31,8 +28,9 @@ def command(name: str, ends: str | None, output: RunOptions, **values: Any) -> i
     each rod; sections, of stock sizes; tails, cut lengths; clamps; supports; holes, the joints' places on the rods;
     offsets of the rods. A result that was refined by the same keys continues from its design.
 
-    A design is accepted if it lies flat, pops up from flat to the same shape, does not depend on the mesh, and stays
-    stable and near its target when it is built with errors; else the form stays as it was.
+    It has the supports of --ends; default: as the case says, or pinned. A design is accepted if it lies flat, pops up
+    from flat to the same shape, does not depend on the mesh, and stays stable and near its target when it is built with
+    errors; else the form stays as it was.
     """
     overrides = overrides_of(values)
     path = Path(name)
@@ -42,8 +40,8 @@ def command(name: str, ends: str | None, output: RunOptions, **values: Any) -> i
         name, stem = str(path / "case.toml"), path.resolve().name
     else:
         stem = path.stem
-    if ends is not None:
-        overrides |= {"pop_up.ends": choice("--ends", ends, tuple(SUPPORTS))}
+    if ends := overrides.get("pop_up.ends"):
+        choice("--ends", ends, tuple(SUPPORTS))
     case = load_case(name, overrides)
     if path.is_dir() and case.refine.start is None and all(key.partition(".")[0] in LATER for key in overrides):
         overrides |= _design(path, case)

@@ -147,6 +147,7 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
     """
     from rodshell.output.files import reserved, save
     from rodshell.results.folder import open_folder
+    from rodshell.results.offers import offered
 
     names = ["result.json", "states.npz", *_names_of(case), *reserved(output.kinds)]
     with open_folder(output.out or default_folder(name), reserved=names, force=output.force) as place:
@@ -172,7 +173,10 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
             lambda folder: save(archive, folder, output.kinds, more=_pictures(form), progress=in_time),
             refused,
         )
-        return deliver(outcome, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+        code = deliver(outcome, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
+        if place.committed and not output.quiet and offered(archive.verdict):
+            say(f"rodshell advise {quote(str(place.path))} tries what may help")
+        return code
 
 
 def default_folder(name: str) -> Path:
@@ -258,10 +262,15 @@ def _saved(outcome: Outcome, place: "ResultFolder") -> Path:
             raise
         raise KeyboardInterrupt(f"the new result in {place.path} is complete") from None
     except ForeignFileError as error:
-        names = (place.path.with_name(f"{place.path.name}-{k}") for k in count(2))
-        free = next(path for path in names if not path.exists())
+        free = free_name(place.path)
         with open_folder(free) as other:
             shutil.copytree(place.new, other.new, dirs_exist_ok=True)
             other.commit()
         say(f"written to {free} instead: {error}")
         return free
+
+
+def free_name(path: Path) -> Path:
+    """A folder next to `path` that does not exist yet."""
+    names = (path.with_name(f"{path.name}-{k}") for k in count(2))
+    return next(name for name in names if not name.exists())

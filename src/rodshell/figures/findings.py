@@ -4,7 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field
 
-from rodshell.figures.records import Ends, Number, Record, Rows, Text, key, rows
+from rodshell.figures.records import Ends, Flag, Number, Record, Rows, Text, key, rows
 from rodshell.figures.sentences import SENTENCES
 
 CODES = {
@@ -104,6 +104,18 @@ class Finding(Record):
     unit: Text = Field(default="", description='"m", or "" for a number or a share')
     place: Text | None = key("the rod, or the combination of loads")
     offers: Rows[Text] = rows("commands that may mend it, to be run in the folder of the result")
+
+
+class Tried(Record):
+    """What an offer of a finding came to when `rodshell advise` tried it."""
+
+    offer: Text = Field(description="the command, as among the finding's offers")
+    code: Text = Field(description="of the finding")
+    before: Number = key("the finding's figure in this result, in its unit")
+    after: Number = key("that figure with the offer; null: not known")
+    level: Text | None = key("of the verdict with the offer; null: no form was found")
+    helps: Flag | None = key("whether that figure is better, and the findings as a whole are")
+    said: Text = Field(default="", description="the verdict's first sentence with the offer, or why there is no form")
 
 
 class Said(str):

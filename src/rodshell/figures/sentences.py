@@ -77,7 +77,7 @@ SENTENCES = {
     "no_design": "no design was found that carries the loads with its reserve ({count} tried); {limits}",
     "no_imperfections": (
         "imperfections were left out, and the factors on the loads are those of the perfect shell: have them "
-        "looked at ({offer})"
+        'looked at (--stability.imperfection "span/500")'
     ),
     "no_loads": (
         "stresses and support forces are those of the unloaded shell{snow}; other loads (wind, drifts, people) and "
@@ -206,7 +206,7 @@ SENTENCES = {
     ),
     "strength_of_beam": (
         "with {ends} ends the beam {beam} along the edge uses {share} of its design strength {under}, near the rod end "
-        "{place}"
+        "{place}: give it a larger section in the case file"
     ),
     "strength_of_beam: buckles": (
         "with {ends} ends a span of the beam {beam} along the edge has to carry {share} of its Euler load {under}, and "

@@ -32,6 +32,7 @@ from rodshell.results.facts import facts, mass_text
 from rodshell.results.judged.deployment import unknown_below
 from rodshell.results.judged.stress import by_design_strength
 from rodshell.results.laths import laths_text
+from rodshell.results.offers import ADVICE, advice_rows
 from rodshell.results.states import is_shell, shells_among
 from rodshell.results.wording import Rounding, percent, rounding_of, whole_percent
 from rodshell.rods.supports import finals_first
@@ -70,6 +71,8 @@ def report_html(archive: Archive) -> str:
         size=size_text(archive),
         summary=plan.summary,
         verdict=archive.verdict,
+        advice_head=ADVICE,
+        advice=advice_rows(results, archive.verdict),
         facts=facts(results),
         dropped=results.dropped,
         view=_view(archive),

@@ -16,7 +16,7 @@ from rodshell.errors import InputError, OutputError
 from rodshell.figures import checks, form
 from rodshell.figures.design import Design
 from rodshell.figures.fabrication import Brace, Fabrication
-from rodshell.figures.findings import Finding, Level
+from rodshell.figures.findings import Finding, Level, Tried
 from rodshell.figures.loads import DesignStrength, LoadCases, LoadedShell
 from rodshell.figures.records import (
     FARTHEST,
@@ -152,6 +152,7 @@ class Results(Record, metaclass=_Refusing):
     fabrication: Fabrication | None = key("how the rods are cut and braced")
     drawings: Drawings | None = key("what the drawings have in common")
     verdict: Verdict | None = key("what the result is worth")
+    advice: Rows[Tried] = rows("what came of the verdict's offers that `rodshell advise` has tried")
 
     @classmethod
     def of(cls, content: Mapping[str, Any], *, source: str = "the result") -> Self:

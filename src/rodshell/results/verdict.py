@@ -38,8 +38,9 @@ from rodshell.results.judged.shape import (
 )
 from rodshell.results.judged.stress import fibre_faults, rod_points
 from rodshell.results.judged.supports import air_findings, beam_faults, beams_to_check
+from rodshell.results.offers import offers_of
 from rodshell.results.results import Results, Verdict
-from rodshell.results.wording import FORM_AGAIN, percent, rounded, rounded_down, shown_factor, snow_text
+from rodshell.results.wording import percent, rounded, rounded_down, shown_factor, snow_text
 
 FLAT = SENTENCES["flat"]
 
@@ -108,7 +109,8 @@ def _verdict(results: Results, level: Level, reasons: Iterable[Said]) -> Verdict
         finding = each.finding
         far = finding.code == "off_target" and (finding.figure or 0.0) > FAR_OFF
         alone = "unbuildable" if far else level_of(finding.code)
-        once.setdefault(str(each), finding.changed(level=min(alone, level, key=RANKS.index)))
+        offers = tuple(dict.fromkeys([*finding.offers, *offers_of(results, finding, each)]))
+        once.setdefault(str(each), finding.changed(level=min(alone, level, key=RANKS.index), offers=offers))
     stands_alone = level in ("good", "check") and not results.loads
     return Verdict(
         level=level, unloaded=stands_alone or None, reasons=tuple(once), findings=tuple(once.values())
@@ -194,8 +196,7 @@ def _assumed(results: Results) -> Iterator[Said]:
     if design is not None and design.assumed_creep is not None:
         yield said("assumed_creep", None, design.assumed_creep, creep=percent(design.assumed_creep))
     if any(found.imperfect_kind is None for _, _, found in results.loaded_shells()):
-        offer = f'{FORM_AGAIN} --stability.imperfection "span/500"'
-        yield said("no_imperfections", offers=(offer,), offer=offer)
+        yield said("no_imperfections")
     if strength is not None and strength.code and strength.service_class is None:
         yield said("assumed_class")
     if strength is not None and strength.relaxed:

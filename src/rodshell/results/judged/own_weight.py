@@ -34,7 +34,7 @@ def reserve(results: Results) -> float:
 def falling(results: Results) -> set[Ends]:
     """The end conditions with which the shell, braced if it is to be, falls under its own weight."""
     ends = list(results.self_weight)
-    found = _carried(results, ends)
+    found = self_weights(results, ends)
     return {end for end in _below(found, 1.0) if found[end].limit not in NOT_KNOWN}
 
 
@@ -45,7 +45,7 @@ def none_stands(results: Results, usable: Sequence[Ends], lost: Sequence[Ends]) 
         usable: with which there is a shell without another fault.
         lost: with which the pop-up did not converge.
     """
-    fallen, found = falling(results), _carried(results, usable)
+    fallen, found = falling(results), self_weights(results, usable)
     falls, why = [end for end in usable if end in fallen], dict.fromkeys(lost, "the pop-up did not converge")
     for end in usable:
         weighed = found.get(end) or SelfWeight()
@@ -70,7 +70,7 @@ def _bracing(results: Results) -> str:
 def weight_findings(results: Results, ends: list[Ends]) -> tuple[list[Said], bool]:
     """What is said of shells that do not carry their own weight with the reserve that is asked for, or are not known
     to; and whether one of them stands."""
-    found, bracing, asked = _carried(results, ends), _bracing(results), reserve(results)
+    found, bracing, asked = self_weights(results, ends), _bracing(results), reserve(results)
     findings, parts = list[Said](), _below(found, 1.0)
     lost = {end for end, weighed in found.items() if weighed.limit == "not followed"}
     bare = _below({end: results.self_weight[end] for end in ends if end in results.self_weight}, 1.0)
@@ -116,7 +116,7 @@ def _of_parts(
     return said(sentence, ends, min(factors.values()), limit, offers=offers, **words)
 
 
-def _carried(results: Results, ends: Sequence[Ends]) -> dict[Ends, SelfWeight]:
+def self_weights(results: Results, ends: Sequence[Ends]) -> dict[Ends, SelfWeight]:
     """How much of its own weight the shell carries with these ends, with its bracing if it has any."""
     found = {end: results.self_weight[end] for end in ends if end in results.self_weight}
     if not is_braced(results):
