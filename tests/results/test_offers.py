@@ -15,6 +15,7 @@ from docs.generators.findings import WHAT_TO_DO
 from rodshell.case import Case
 from rodshell.cli import form
 from rodshell.cli.advise import case_of
+from rodshell.figures.design import Design
 from rodshell.figures.findings import CODES, RANKS, Finding, level_of
 from rodshell.figures.sentences import SENTENCES
 from rodshell.results import Archive, Verdict
@@ -78,6 +79,20 @@ def test_the_command_line_takes_every_offer_of_every_code(name: str, tmp_path: P
     assert ("--rotate" in kinds) == (name not in ("geodesics", "seams"))
     assert ("--own" in kinds) == (name not in ("braced", "loads"))
     assert ("--bracing.kind" in kinds) == (name == "loads")
+
+
+@pytest.mark.slow
+def test_a_design_with_given_parts_is_offered_to_be_left_open_and_one_with_none_clamped_ends(tmp_path: Path) -> None:
+    archive, file = made("loads"), tmp_path / "case.toml"
+    file.write_text(archive.case_toml)
+    for given, count in ((("section",), 2), (("section", "bracing", "spacing"), 1)):
+        results = archive.results.changed(design=Design(open=given, found=False, limits="strength", steps=()))
+        offers = offers_of(results, Finding(code="no_design", level="unbuildable"))
+        assert len(offers) == count
+        for offer in offers:
+            case = taken(file, offer)
+            assert case.left_open == case.design.open == ("section", "bracing", "spacing")
+        assert taken(file, offers[-1]).pop_up.ends == "clamped"
 
 
 def test_what_the_command_line_does_not_take_is_seen(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import pytest
 import rodshell as rs
 from rodshell.case import load_case
 from rodshell.cli import main
+from rodshell.errors import InputError
 from rodshell.results.results import Results
 from rodshell.results.wording import section_text
 from rodshell.rods.section import TRADE_SIZES, section_from, size_text
@@ -89,3 +90,10 @@ def test_a_section_in_words_replaces_the_whole_of_another_and_single_keys_change
     assert thicker.rod.build().section == rs.Tube(0.016, 0.004)
     job = rs.Job.load("pavilion", rod="tube 38x3.5").changed({"rod.section": "rod 12"})
     assert job.case.rod.build().section == rs.Circle(0.006)
+
+
+def test_a_section_that_is_given_may_be_left_to_the_target_again() -> None:
+    case = load_case("pavilion", {"rod": "auto"})
+    assert "section" in case.rod.left_open
+    with pytest.raises(InputError, match="give a section with its measures in mm"):
+        section_from("auto")

@@ -30,7 +30,7 @@ from rodshell.rods.section import SectionKeys
 from rodshell.schema import read, value_of, written
 from rodshell.units import shown
 from rodshell.untrusted import limit, raised, read_text
-from rodshell.validation import file_path, instance
+from rodshell.validation import file_path, instance, is_auto
 
 _Raw = dict[str, Any]
 
@@ -251,10 +251,15 @@ def _read_words(raw: _Raw, overrides: dict[str, object]) -> None:
         table, _, name = path.rpartition(".")
         inner = _found_table(raw, table)
         if isinstance(inner.get(name), str):
-            inner[name] = dict(value_of(SectionKeys, path, inner[name]))
+            inner[name] = _in_keys(path, inner[name])
         if isinstance(overrides.get(path), str):
-            for key, value in value_of(SectionKeys, path, overrides.pop(path)).items():
+            for key, value in _in_keys(path, str(overrides.pop(path))).items():
                 overrides.setdefault(f"{path}.{key}", value)
+
+
+def _in_keys(path: str, words: str) -> _Raw:
+    """A section in words by its keys; "auto" is left to the target."""
+    return {"kind": words} if is_auto(words) else dict(value_of(SectionKeys, path, words))
 
 
 _LOAD_TABLES = ("loads", "combinations", "bracing", "locked_joints", "stability", "strength")

@@ -38,6 +38,7 @@ REMEDIES = {
     "imperfect_unknown": f"finer {LOADED}",
     "lost": "stages finer",
     "needs_bracing": "thicker clamped",
+    "no_design": "open open-clamped",
     "no_imperfections": "imperfect",
     "no_loads": "snow",
     "not_checked": "deployed",
@@ -69,6 +70,8 @@ BRACINGS = {
     "laths both ways": {"kind": "laths", "pattern": "both"},
 }  # fmt: skip
 """Keys of bracing: ropes both ways to the supports, or a third layer of the grid's laths."""
+OPEN = ("section", "bracing", "spacing")
+ALL_OPEN = f'--rod auto --spacing auto --bracing.kind none --design.open "{", ".join(OPEN)}"'
 THIN, THIN_ROPE = 0.025, "rod 4"  # rods up to that depth [m] have such cables
 
 NAMED_EDGE = re.compile(r"layout\.edge of ([\d.]+ m{1,2})\b")  # in warnings of a mesh that is too coarse
@@ -121,6 +124,10 @@ def _options(results: Results, finding: Finding, remedy: str) -> Iterator[str]:
         yield _spacing(layout, [(CLOSER if remedy == "closer" else WIDER) * each for each in dict.fromkeys(spacing)])
     elif remedy == "finer" and layout and layout.edge:
         yield f'--edge "{rounded(1e3 * FINER * layout.edge)} mm"'
+    elif remedy in ("open", "open-clamped") and results.design and square:
+        further = remedy == "open-clamped" and pinned and ends <= USUAL
+        if further or len(results.design.open) < len(OPEN):
+            yield ALL_OPEN + f" --ends {CLAMPED.name}" * further
     elif remedy == "rotated" and layout and square:
         yield f'--rotate "{(degrees(layout.rotate or 0.0) + 45) % 90:.3g} deg"'
     elif remedy == "deployed" and results.deployment is None and ends <= USUAL:
