@@ -145,10 +145,11 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
         name: of the case, by which its folder is called.
         formed_before: the form is on disk already; where its loads cannot be checked it is not written again.
     """
-    from rodshell.output.files import reserved, save
+    from rodshell.output.files import reserved, save, wanted_kinds
     from rodshell.results.folder import open_folder
 
-    names = ["result.json", "states.npz", *_names_of(case), *reserved(output.kinds)]
+    kinds = wanted_kinds(output.kinds, case.drawings.files)
+    names = ["result.json", "states.npz", *_names_of(case), *reserved(kinds)]
     with open_folder(output.out or default_folder(name), reserved=names, force=output.force) as place:
         compile_before_first(quiet=output.quiet)
         from rodshell.job import Job
@@ -169,7 +170,7 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
             archive.results.status,
             summary,
             archive.results.plain(),
-            lambda folder: save(archive, folder, output.kinds, more=_pictures(form), progress=in_time),
+            lambda folder: save(archive, folder, kinds, more=_pictures(form), progress=in_time),
             refused,
         )
         return deliver(outcome, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
@@ -226,7 +227,7 @@ def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_j
         click.echo(json.dumps({"out": str(folder), **outcome.content}))
     elif not quiet:
         click.echo(outcome.summary.replace(FORM_AGAIN, again))
-        say(f"written to {folder}")
+        say(f"written to {folder}{_in_words(folder)}")
     if outcome.refused:
         say(f"error: {outcome.refused}; the form is in {folder}, without its loads")
         return BAD_INPUT
@@ -242,6 +243,16 @@ def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_j
         say(f"{named}: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
         return codes[level]
     return FOUND
+
+
+def _in_words(folder: Path) -> str:
+    """Which files a result has, and how the others are got."""
+    from rodshell.output.files import in_words
+
+    written, left = in_words(folder)
+    shown = folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder
+    later = f"; rodshell export {quote(str(shown))} writes {', '.join(left)}" if left else ""
+    return f": {', '.join(written)}{later}" if written else later
 
 
 def _saved(outcome: Outcome, place: "ResultFolder") -> Path:

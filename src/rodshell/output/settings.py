@@ -6,11 +6,15 @@ from typing import Annotated, Any, Literal
 
 from rodshell.errors import InputError
 from rodshell.output.drawing import FORBIDDEN, LAYERS
-from rodshell.quantities import IsoDate, Length, Stages, Stress
+from rodshell.quantities import IsoDate, Length, Stages, Stress, words
 from rodshell.schema import checked
 from rodshell.units import shown
 from rodshell.validation import instance
 
+FILES = (
+    "report", "csv", "strips", "dxf", "svg", "pdf", "obj", "gltf", "vtp", "compas", "png", "3dm", "opensees", "all",
+)  # fmt: skip
+"""Kinds of files (see `output.files`)."""
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 
 
@@ -73,7 +77,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class DrawingStyle:
-    """What the drawings of a set have in common.
+    """What the drawings of a set have in common, and which kinds of files a job writes in addition to the first ones.
 
     Args:
         tolerance: of lengths [m], by which they are also rounded (see `wording.rounding_of`); None:
@@ -90,6 +94,7 @@ class DrawingStyle:
     name: Annotated[str, "title of the drawings; default: the target's name"] = ""
     author: Annotated[str, "who drew them or is responsible for them, for the title block"] = ""
     date: Annotated[IsoDate, 'date for the title block, such as "2026-11-22"; default: today'] = ""
+    files: Annotated[Annotated[tuple[str, ...], words(FILES)], "kinds that are written beyond the first, or all"] = ()
 
     def __post_init__(self) -> None:
         for key in ("paper", "project", "revision", "name", "author", "date"):
@@ -101,4 +106,5 @@ class DrawingStyle:
 
     def parameters(self) -> dict[str, Any]:
         """As it is kept in a result."""
-        return {**vars(self), "layers": Layers.of(self.layers).renamed}
+        kept = {key: value for key, value in vars(self).items() if key != "files"}
+        return {**kept, "layers": Layers.of(self.layers).renamed}
