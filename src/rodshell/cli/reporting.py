@@ -5,6 +5,7 @@ import os
 import shutil
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from glob import escape
 from itertools import count
@@ -250,7 +251,9 @@ def _in_words(folder: Path) -> str:
     from rodshell.output.files import in_words
 
     written, left = in_words(folder)
-    shown = folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder
+    shown = folder
+    with suppress(OSError, ValueError):  # the current folder is gone, or not above it
+        shown = folder.relative_to(Path.cwd())
     later = f"; rodshell export {quote(str(shown))} writes {', '.join(left)}" if left else ""
     return f": {', '.join(written)}{later}" if written else later
 

@@ -22,12 +22,12 @@ from rodshell.output.models import compas_json, glb_bytes, obj_text, rhino_bytes
 from rodshell.output.opensees import opensees_files
 from rodshell.output.pictures import deployment_picture, picture
 from rodshell.output.schedules import SCHEDULES, table_csv
-from rodshell.output.settings import FILES
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results.archive import Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
 from rodshell.results.manifest import read_manifest
 from rodshell.results.states import DRAPED, POPPED, shells_among
+from rodshell.units import shown
 from rodshell.validation import described, flag, instance, mapping
 
 Files = Iterator[tuple[str, str | bytes]]
@@ -137,19 +137,22 @@ def in_words(folder: Path) -> tuple[list[str], list[str]]:
     return [word for word in WORDS if found[word]], [word for word in WORDS if not found[word]]
 
 
-def wanted_kinds(kinds: object, more: Iterable[str] = ()) -> list[str]:
+def wanted_kinds(kinds: object, more: str = "") -> list[str]:
     """The kinds of files that are wanted.
 
     Args:
         kinds: one text such as "dxf, csv", in any case, or several kinds, maybe none; None: the default ones.
-        more: kinds in addition to the default ones.
+        more: the case's `drawings.files`: one text, of kinds in addition to the default ones.
 
     Raises:
         InputError: an unknown kind.
     """
     if kinds is None:
-        kinds = [*DEFAULT, *more]
-    elif isinstance(kinds, str):
+        try:
+            kinds = [*DEFAULT, *(wanted_kinds(more) if more else ())]
+        except InputError as fault:
+            raise InputError(f"drawings.files = {shown(more)}: {fault}") from None
+    if isinstance(kinds, str):
         kinds = [word.strip().lower() for word in kinds.split(",") if word.strip()] or [kinds]
     if not isinstance(kinds, Iterable) or getattr(kinds, "ndim", 1) == 0:
         raise InputError(f"kinds must be kinds of files, such as {', '.join(KINDS)}, not {described(kinds)}")
@@ -158,8 +161,8 @@ def wanted_kinds(kinds: object, more: Iterable[str] = ()) -> list[str]:
 
 def _known(kind: object) -> tuple[str, ...]:
     """The kinds that a word names, of which no file belongs to two."""
-    if not isinstance(kind, str) or kind not in FILES:
-        raise InputError(f"unknown kind of file {described(kind)}: use {', '.join(FILES)}")
+    if not isinstance(kind, str) or kind not in (*KINDS, "all"):
+        raise InputError(f"unknown kind of file {described(kind)}: use {', '.join(KINDS)}, or all")
     return {"all": ALL, "dxf": ("strips", "dxf")}.get(kind, (kind,))
 
 

@@ -6,15 +6,11 @@ from typing import Annotated, Any, Literal
 
 from rodshell.errors import InputError
 from rodshell.output.drawing import FORBIDDEN, LAYERS
-from rodshell.quantities import IsoDate, Length, Stages, Stress, words
+from rodshell.quantities import IsoDate, Length, Stages, Stress
 from rodshell.schema import checked
 from rodshell.units import shown
 from rodshell.validation import instance
 
-FILES = (
-    "report", "csv", "strips", "dxf", "svg", "pdf", "obj", "gltf", "vtp", "compas", "png", "3dm", "opensees", "all",
-)  # fmt: skip
-"""Kinds of files (see `output.files`)."""
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 
 
@@ -77,7 +73,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class DrawingStyle:
-    """What the drawings of a set have in common, and which kinds of files a job writes in addition to the first ones.
+    """What the drawings of a set have in common, and which kinds of files a job writes beyond the usual ones.
 
     Args:
         tolerance: of lengths [m], by which they are also rounded (see `wording.rounding_of`); None:
@@ -94,10 +90,10 @@ class DrawingStyle:
     name: Annotated[str, "title of the drawings; default: the target's name"] = ""
     author: Annotated[str, "who drew them or is responsible for them, for the title block"] = ""
     date: Annotated[IsoDate, 'date for the title block, such as "2026-11-22"; default: today'] = ""
-    files: Annotated[Annotated[tuple[str, ...], words(FILES)], "kinds that are written beyond the first, or all"] = ()
+    files: Annotated[str, 'files beyond the report, schedules and strips, such as "pdf, obj", or "all"'] = ""
 
     def __post_init__(self) -> None:
-        for key in ("paper", "project", "revision", "name", "author", "date"):
+        for key in ("paper", "project", "revision", "name", "author", "date", "files"):
             instance(f"the {key} of drawings", getattr(self, key), str, "text")
         if self.paper not in PAPERS:
             raise InputError(f"unknown paper size {shown(self.paper)}: use {', '.join(PAPERS)}")
