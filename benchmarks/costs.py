@@ -9,7 +9,7 @@ import rodshell as rs
 from benchmarks.rows import Row, Section, clock
 from rodshell.checks.contact import contact_of
 from rodshell.layout import FlatGrid, FlatRod, mesh_grid
-from rodshell.output.files import DEFAULT, export
+from rodshell.output.files import export
 from rodshell.results import Archive, Results
 from tests.acceptance.targets import SAME, gallery, gallery_target
 from tests.output.sample_archive import with_deployment
@@ -62,7 +62,7 @@ def _to_export(archive: Archive) -> float:
     """Seconds of an export and of the processes that help it."""
     with tempfile.TemporaryDirectory() as folder:
         start = sum(os.times()[:4])
-        export(archive, folder, DEFAULT)
+        export(archive, folder)
         return sum(os.times()[:4]) - start
 
 

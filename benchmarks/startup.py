@@ -49,11 +49,11 @@ form = Job.of_case(case).run(until="pop-up")
 told("solve")
 archive = form.archive()
 told("checks")
-from rodshell.output.files import DEFAULT, KINDS, save
+from rodshell.output.files import ALL, KINDS, save
 from rodshell.output.drawings import drawing_set
 drawing_set(archive)
 told("drawings")
-for kind in DEFAULT:
+for kind in ALL:
     list(KINDS[kind](archive))
     told(kind)
 with tempfile.TemporaryDirectory() as folder:

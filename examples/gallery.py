@@ -98,4 +98,4 @@ if __name__ == "__main__":
             archive = form.archive()
             found = verdict_of(archive.results)
             print(f"  {found.headline}")
-            archive.save(Path("out") / name.replace(" ", "-").replace(",", ""))
+            form.save(Path("out") / name.replace(" ", "-").replace(",", ""))

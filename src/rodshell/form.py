@@ -325,19 +325,19 @@ class Form:
         kinds: str | Iterable[str] | None = None,
         force: bool = False,
     ) -> Path:
-        """Write archive, drawings, schedules, models and report; the folder's absolute path.
+        """Write archive, report, schedules and strips, or the files that are asked for; the folder's absolute path.
 
         Args:
             options: as of `archive`.
-            kinds: of files in addition to the archive, such as ["dxf", "csv"] or "dxf, csv"; default: all that every
-                installation can.
+            kinds: of files in addition to the archive, such as ["dxf", "csv"], "dxf, csv" or "all"; default: report,
+                csv, strips, and those of the case's `drawings.files`.
             force: also replace files that rodshell did not write, or that were changed since, where it has to write.
 
         Raises:
             InputError: an unknown kind. OutputError : the folder cannot be written, or such files are there and `force`
                 is False.
         """
-        wanted = wanted_kinds(kinds)  # before the checks, which take time
+        wanted = wanted_kinds(kinds, (options or self.options).drawings.files)  # before the checks, which take time
         return save(self.archive(options=options), folder, wanted, force=force)
 
     def widget(self) -> "AnyWidget":

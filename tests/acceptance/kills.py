@@ -32,7 +32,10 @@ class Job:
     new: tuple[str, ...] = ("--drawings.project", NEW, "--spacing", "55mm")
 
 
-SMALL = ("form", "hemisphere", "--rods", "7x7", "--spacing", "60mm", "--edge", "20mm", "--length", "900mm")
+SMALL = (
+    "form", "hemisphere", "--rods", "7x7", "--spacing", "60mm", "--edge", "20mm", "--length", "900mm",
+    "--drawings.files", "all",
+)  # fmt: skip
 JOBS = {
     "bound": Job("bound", SMALL),
     "gravity": Job("gravity", (*SMALL, "--method", "gravity")),
@@ -47,6 +50,7 @@ edge = 0.04
 length = 0.9
 [drawings]
 project = "{project}"
+files = "all"
 """
 LOADS = """[[loads]]
 name = "snow"
@@ -66,7 +70,7 @@ def jobs_of_files(folder: Path) -> dict[str, Job]:
         (folder / f"{name}.toml").write_text(CASE.format(spacing=spacing, project=word))
     cases = ((str(folder / "old.toml"),), (str(folder / "new.toml"),))
     run(Job("source", ("form",)), cases[0], folder / "source")
-    projects = ("--drawings.project", OLD), ("--drawings.project", NEW)
+    projects = tuple(("--drawings.files", "all", "--drawings.project", word) for word in (OLD, NEW))
     return {
         "check": Job("check", ("check", "--loads", str(folder / "loads.toml")), *cases),
         "refine": Job("refine", ("refine", "--vary", "tails"), *cases),

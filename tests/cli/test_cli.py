@@ -540,8 +540,8 @@ def test_popup_writes_only_the_kinds_that_are_asked_for(
     kinds = list[object]()
     save = FakeArchive.save
     monkeypatch.setattr(FakeArchive, "save", lambda self, to, only, **more: (kinds.append(only), save(self, to)))
-    assert main(["popup", "dome", "--only", "csv, dxf"]) == 0
-    assert kinds == [["csv", "dxf"]]
+    assert main(["popup", "dome", "--only", "csv, pdf"]) == 0
+    assert kinds == [["csv", "pdf"]]
     capsys.readouterr()
     assert 'unknown kind of file "docx"' in refused(capsys, "popup", "dome", "--only", "docx", "--out", "x")
 

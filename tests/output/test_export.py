@@ -29,7 +29,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize("name", ["wished", "sample", "table"])
 def test_files_made_again_from_the_folder_are_the_same_bytes(name: str, tmp_path: Path) -> None:
     made = {"wished": wished, "sample": sample_archive, "table": table_archive}[name]()
-    first = save(made, tmp_path / "first")
+    first = save(made, tmp_path / "first", "all")
     names = export(read(first), tmp_path / "again")
     again = contents(tmp_path / "again")
     assert set(names) == set(again)
@@ -64,7 +64,7 @@ def test_numbers_of_the_files_come_from_the_archive(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_command_writes_what_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = save(sample_archive(), tmp_path / "dome")
+    folder = save(sample_archive(), tmp_path / "dome", "dxf, csv")
     before = contents(folder)
     for path in (folder / "drawings/plan.dxf", folder / "schedule/rods.csv"):
         path.unlink()
@@ -79,7 +79,7 @@ def test_command_writes_what_is_asked_for(tmp_path: Path, capsys: pytest.Capture
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "reason"),
-    [(["--only", "dxf,cvs"], 'unknown kind of file "cvs": use dxf, svg'), (["--only", ","], "unknown kind of file"),
+    [(["--only", "dxf,cvs"], 'unknown kind of file "cvs": use report, csv'), (["--only", ","], "unknown kind of file"),
      (["--out", "{file}"], "it is a file; choose a folder")],
 )  # fmt: skip
 def test_bad_requests_are_one_sentence(
@@ -97,8 +97,10 @@ def test_bad_requests_are_one_sentence(
 
 
 def test_kinds_are_read_in_any_case_and_checked() -> None:
-    assert wanted_kinds(" DXF,csv ") == ["dxf", "csv"]
-    assert set(DEFAULT) == set(KINDS) - {"3dm", "opensees"}
+    assert wanted_kinds(" PDF,csv ") == ["pdf", "csv"]
+    assert wanted_kinds(None, "pdf") == [*DEFAULT, "pdf"]
+    assert wanted_kinds(["strips", "dxf"]) == wanted_kinds("dxf") == ["strips", "dxf"]  # no file is written twice
+    assert {*wanted_kinds("all")} == {*KINDS} - {"3dm", "opensees"}
     with pytest.raises(InputError, match="report"):
         wanted_kinds("html")
 
@@ -152,7 +154,7 @@ def test_millimetres_and_metres_give_the_same_drawings_to_the_byte(tmp_path: Pat
     made = []
     for k, values in enumerate((METRES, MILLIMETRES)):
         (tmp_path / f"case{k}.toml").write_text(CASE.format(**values))
-        assert main(["form", str(tmp_path / f"case{k}.toml"), "--out", str(tmp_path / f"out{k}"), "--quiet"]) == 4
+        assert main(["form", str(tmp_path / f"case{k}.toml"), "--all", "--out", str(tmp_path / f"out{k}"), "-q"]) == 4
         files = contents(tmp_path / f"out{k}")
         made.append({name: data for name, data in files.items() if name.startswith(("drawings", "schedule", "model"))})
     assert len(made[0]) > 25
@@ -162,7 +164,7 @@ def test_millimetres_and_metres_give_the_same_drawings_to_the_byte(tmp_path: Pat
 @pytest.mark.slow
 def test_drawings_are_the_same_whatever_the_hash_seed(tmp_path: Path) -> None:
     """Another process with another order of sets writes the same bytes."""
-    first = save(wished(), tmp_path / "first")
+    first = save(wished(), tmp_path / "first", "all")
     code = "import sys; from rodshell.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [
         sys.executable,
@@ -186,7 +188,7 @@ def test_a_job_that_stopped_before_the_pop_up_still_gives_its_files(tmp_path: Pa
     """Nothing was checked, nothing popped up: drawings of the flat grid and the drape are all there is."""
     dome = form("dome")
     stopped = replace(dome, stages=replace(dome.stages, popped={}, agreement={}))
-    out = stopped.save(tmp_path / "stopped")
+    out = stopped.save(tmp_path / "stopped", kinds="all")
     files = contents(out)
     assert {"drawings/plan.dxf", "drawings/drawings.pdf", "schedule/rods.csv", "model/draped.vtp"} <= set(files)
     assert not any("erection" in name or "pop_up" in name or "stress" in name for name in files)
@@ -221,8 +223,8 @@ def test_form_writes_only_what_is_asked_for(tmp_path: Path, capsys: pytest.Captu
 
 @pytest.mark.parametrize(
     ("kinds", "sentence"),
-    [("cvs", '^unknown kind of file "cvs": use dxf, svg'), (["dxff"], '^unknown kind of file "dxff": use dxf, svg'),
-     ([3], "^unknown kind of file 3: use dxf"), (3, "^kinds must be kinds of files, such as dxf, .*, not 3$")],
+    [("cvs", '^unknown kind of file "cvs": use report, '), (["dxff"], '^unknown kind of file "dxff": use report, '),
+     ([3], "^unknown kind of file 3: use report"), (3, "^kinds must be kinds of files, such as report, .*, not 3$")],
 )  # fmt: skip
 def test_an_unknown_kind_is_refused_in_python_as_by_the_command(kinds: object, sentence: str, tmp_path: Path) -> None:
     for write in (save, export):

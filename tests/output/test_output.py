@@ -36,12 +36,12 @@ def archive() -> Archive:
 
 @pytest.fixture(scope="module")
 def out(archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return save(archive, tmp_path_factory.mktemp("results") / "dome")
+    return save(archive, tmp_path_factory.mktemp("results") / "dome", "all")
 
 
 @pytest.fixture(scope="module")
 def table_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return save(table_archive(), tmp_path_factory.mktemp("results") / "table")
+    return save(table_archive(), tmp_path_factory.mktemp("results") / "table", "all")
 
 
 def rows(out: Path, name: str) -> list[dict[str, str]]:
@@ -345,7 +345,7 @@ def test_no_name_breaks_a_page_or_a_drawing(tmp_path: Path) -> None:
     plain = table_archive()
     name = '"><script>x</script> & \N{GREEK SMALL LETTER ALPHA}\x07'
     archive = Archive(Results.of({**plain.results.plain(), "name": name}), plain.states, "# </pre><script>x</script>")
-    out = save(archive, tmp_path / "named")
+    out = save(archive, tmp_path / "named", "all")
     assert "<script>x" not in (out / "report.html").read_text()
     root = ET.parse(out / "drawings/plan.svg").getroot()
     texts = {text.text or "" for text in root.iter(f"{SVG}text")}
@@ -359,9 +359,8 @@ def test_least_result_is_written(tmp_path: Path) -> None:
     """A result with nothing but rods (a run stopped early) still gives its files."""
     full = sample_archive()
     result = {key: full.results.plain()[key] for key in ("format", "version", "units", "rods")}
-    out = save(
-        Archive(Results.of({**result, "status": "diverged"}), {"flat": full.states["flat"]}, ""), tmp_path / "least"
-    )
+    least = Archive(Results.of({**result, "status": "diverged"}), {"flat": full.states["flat"]}, "")
+    out = save(least, tmp_path / "least", "all")
     assert (
         "Not known: the computation did not converge, which says nothing about the shell itself: diverged"
         in (out / "report.html").read_text()
@@ -450,7 +449,7 @@ def test_json_holds_no_nan(archive: Archive, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_same_archive_gives_the_same_bytes(archive: Archive, out: Path, tmp_path: Path) -> None:
-    again = save(archive, tmp_path / "again")
+    again = save(archive, tmp_path / "again", "all")
     for path in out.rglob("*"):
         if path.is_file():
             assert path.read_bytes() == (again / path.relative_to(out)).read_bytes(), path.name

@@ -14,6 +14,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 PAGES = {page.stem: page for room in ("start", "tutorials") for page in sorted((ROOT / "docs" / room).glob("*.md"))}
 QUICK = ["--checks.stages", "0", "--refine.offer", "off"]  # of the form's checks, what the pages do not speak of
+OF_STAGES = ["schedule/end_paths.csv"]
 UNBUILDABLE = {"out/thick", "out/dropped", "out/paraboloid"}
 SAID = {
     "designers": ["24 rods", "2.5 mm"],
@@ -46,6 +47,10 @@ def test_a_page_can_be_followed(
     printed = re.sub(r"\s+", " ", capsys.readouterr().out)
     for words in SAID[name]:
         assert words in printed, words
+    for out, table in re.findall(r"\| file in `(.*?)/` .*?\n(.*?)\n\n", text, re.DOTALL):
+        for first, *others in (re.findall(r"`(.*?)`", row.split("|")[1]) for row in table.splitlines()[1:]):
+            files = [first, *(str(Path(first).parent / name) for name in others)]
+            assert all(any(Path(out).glob(file)) or file in OF_STAGES for file in files), files
     for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
         exec(block, {})
     for joint, height in re.findall(r"^\| (\w+/\w+) \| ([\d.]+) \|$", text, re.MULTILINE):

@@ -18,7 +18,7 @@ OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 MESH: dict[str, Any] = {"kind": "mesh", "file": "upload:roof.obj", "unit": "m"}
 LAYERS = ("cut", "mark", "label", "boundary_flat", "boundary_final", "dim", "title")
 WORDS = {  # names, titles and formulas: nothing opens a file of this name
-    *(f"drawings.{name}" for name in ("project", "revision", "name", "author", "date")),
+    *(f"drawings.{name}" for name in ("project", "revision", "name", "author", "date", "files")),
     *(f"drawings.layers.{name}" for name in LAYERS),
     *(f"loads.{name}" for name in ("name", "coefficient", "supports")),
     *("combinations.name", "combinations.factors", "seams.patches.name", "target.formula", "target.object"),

@@ -103,7 +103,7 @@ class RunOptions:
     """Options of the commands that run a job, of their output.
 
     Args:
-        kinds: of files in addition to the archive; None: all that every installation can.
+        kinds: of files in addition to the archive; None: the usual ones, and those that the case asks for.
         limit: longest time for all but the files [s].
     """
 
@@ -127,6 +127,7 @@ ADDRESS = click.option(
 UNITS = 'Values may have a unit: "200 mm", "45 deg", "25 GPa". A plain number is in SI units.'
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 _ONLY = "Kinds of files in addition to the archive, such as dxf,csv; see rodshell export --help."
+_ALL = "Write drawings, PDF, models and pictures too, as rodshell export DIR does later."
 _LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kinds of files that are not are named.'
 
 
@@ -145,6 +146,7 @@ def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any
         options = (
             click.option("--out", "-o", metavar="DIR", help=out),
             click.option("--only", metavar="KINDS", help=_ONLY),
+            click.option("--all", "only", flag_value="all", help=_ALL),
             click.option("--time-limit", metavar="TIME", help=_LIMIT),
             FORCE,
             click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, for programs."),

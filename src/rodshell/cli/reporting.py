@@ -5,6 +5,7 @@ import os
 import shutil
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from glob import escape
 from itertools import count
@@ -145,11 +146,12 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
         name: of the case, by which its folder is called.
         formed_before: the form is on disk already; where its loads cannot be checked it is not written again.
     """
-    from rodshell.output.files import reserved, save
+    from rodshell.output.files import reserved, save, wanted_kinds
     from rodshell.results.folder import open_folder
     from rodshell.results.offers import offered
 
-    names = ["result.json", "states.npz", *_names_of(case), *reserved(output.kinds)]
+    kinds = wanted_kinds(output.kinds, case.drawings.files)
+    names = ["result.json", "states.npz", *_names_of(case), *reserved(kinds)]
     with open_folder(output.out or default_folder(name), reserved=names, force=output.force) as place:
         compile_before_first(quiet=output.quiet)
         from rodshell.job import Job
@@ -170,7 +172,7 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
             archive.results.status,
             summary,
             archive.results.plain(),
-            lambda folder: save(archive, folder, output.kinds, more=_pictures(form), progress=in_time),
+            lambda folder: save(archive, folder, kinds, more=_pictures(form), progress=in_time),
             refused,
         )
         code = deliver(outcome, place, progress=progress, as_json=output.as_json, quiet=output.quiet)
@@ -230,7 +232,7 @@ def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_j
         click.echo(json.dumps({"out": str(folder), **outcome.content}))
     elif not quiet:
         click.echo(outcome.summary.replace(FORM_AGAIN, again))
-        say(f"written to {folder}")
+        say(f"written to {folder}{_in_words(folder)}")
     if outcome.refused:
         say(f"error: {outcome.refused}; the form is in {folder}, without its loads")
         return BAD_INPUT
@@ -246,6 +248,18 @@ def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_j
         say(f"{named}: {verdict['reasons'][0].replace(FORM_AGAIN, again)}; results are in {folder}")
         return codes[level]
     return FOUND
+
+
+def _in_words(folder: Path) -> str:
+    """Which files a result has, and how the others are got."""
+    from rodshell.output.files import in_words
+
+    written, left = in_words(folder)
+    shown = folder
+    with suppress(OSError, ValueError):  # the current folder is gone, or not above it
+        shown = folder.relative_to(Path.cwd())
+    later = f"; rodshell export {quote(str(shown))} writes {', '.join(left)}" if left else ""
+    return f": {', '.join(written)}{later}" if written else later
 
 
 def _saved(outcome: Outcome, place: "ResultFolder") -> Path:

@@ -1,11 +1,16 @@
 """Every file that is made from an archive, by kind: what `rodshell export --only` may ask for.
 
+A job writes the kinds of `DEFAULT`, with which a workshop begins; `rodshell export` writes the others when they are
+wanted.
+
 Modules that need a library of one kind of file alone are imported when such a file is written.
 """
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from fnmatch import fnmatch
+from functools import partial
 from pathlib import Path
 from shlex import quote
 from warnings import warn
@@ -20,7 +25,9 @@ from rodshell.output.schedules import SCHEDULES, table_csv
 from rodshell.progress import Progress, require_progress, silent
 from rodshell.results.archive import Archive, archive_names, put_archive
 from rodshell.results.folder import ResultFolder, open_folder
+from rodshell.results.manifest import read_manifest
 from rodshell.results.states import DRAPED, POPPED, shells_among
+from rodshell.units import shown
 from rodshell.validation import described, flag, instance, mapping
 
 Files = Iterator[tuple[str, str | bytes]]
@@ -38,7 +45,8 @@ def save(
     """Write the whole result folder, replacing an older result's files and no others; returns its absolute path.
 
     Args:
-        kinds: of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv"; default: `DEFAULT`.
+        kinds: of files in addition to the archive (see `KINDS`), or one text such as "dxf, csv", or "all"; default:
+            `DEFAULT`.
         force: also replace files that rodshell did not write, or that were changed since, where it has to write.
         progress: called for each kind of files; where it raises OutOfTimeError the archive is written and the kinds
             that are left are not, with a warning that names them.
@@ -75,8 +83,9 @@ def save(
 def export(
     archive: Archive,
     folder: str | os.PathLike[str],
-    kinds: str | Iterable[str] | None = None,
+    kinds: str | Iterable[str] = "all",
     *,
+    keep: bool = False,
     force: bool = False,
     progress: Progress = silent,
 ) -> list[str]:
@@ -84,16 +93,20 @@ def export(
 
     Args:
         kinds: as of `save`, without the archive.
+        keep: leave files that are there as they are, and write the others.
         force, progress: as of `save`.
 
     Raises:
         InputError: as of `save`, or a kind needs a package that is not installed. OutputError : as of `save`.
     """
     _require(archive, force, progress)
+    flag("keep", keep)
     names = list[str]()
     wanted = wanted_kinds(kinds)
-    with open_folder(folder, reserved=reserved(wanted), force=force) as place:
+    with open_folder(folder, reserved=() if keep else reserved(wanted), force=force) as place:
         for name, content in files_of(archive, wanted):
+            if keep and os.path.lexists(place.path / name):
+                continue
             progress("files", f"{len(names) + 1} written, {name}", 0.0)
             place.put(name, content)
             names.append(name)
@@ -116,29 +129,41 @@ def reserved(kinds: str | Iterable[str] | None = None) -> list[str]:
     return [name for kind in wanted_kinds(kinds) for name in NAMES[kind]]
 
 
-def wanted_kinds(kinds: object) -> list[str]:
+def in_words(folder: Path) -> tuple[list[str], list[str]]:
+    """Of what `rodshell export` writes: what rodshell has written into a folder, and what it has not."""
+    there = list(read_manifest(folder))
+    patterns = {word: [name for kind in kinds for name in NAMES[kind]] for word, kinds in WORDS.items()}
+    found = {word: any(fnmatch(name, each) for each in names for name in there) for word, names in patterns.items()}
+    return [word for word in WORDS if found[word]], [word for word in WORDS if not found[word]]
+
+
+def wanted_kinds(kinds: object, more: str = "") -> list[str]:
     """The kinds of files that are wanted.
 
     Args:
         kinds: one text such as "dxf, csv", in any case, or several kinds, maybe none; None: the default ones.
+        more: the case's `drawings.files`: one text, of kinds in addition to the default ones.
 
     Raises:
         InputError: an unknown kind.
     """
     if kinds is None:
-        return list(DEFAULT)
+        try:
+            kinds = [*DEFAULT, *(wanted_kinds(more) if more else ())]
+        except InputError as fault:
+            raise InputError(f"drawings.files = {shown(more)}: {fault}") from None
     if isinstance(kinds, str):
-        words = [word.strip().lower() for word in kinds.split(",") if word.strip()]
-        return [_known(word) for word in words or [kinds]]
+        kinds = [word.strip().lower() for word in kinds.split(",") if word.strip()] or [kinds]
     if not isinstance(kinds, Iterable) or getattr(kinds, "ndim", 1) == 0:
         raise InputError(f"kinds must be kinds of files, such as {', '.join(KINDS)}, not {described(kinds)}")
-    return [_known(kind) for kind in kinds]
+    return list(dict.fromkeys(each for kind in kinds for each in _known(kind)))
 
 
-def _known(kind: object) -> str:
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise InputError(f"unknown kind of file {described(kind)}: use {', '.join(KINDS)}")
-    return kind
+def _known(kind: object) -> tuple[str, ...]:
+    """The kinds that a word names, of which no file belongs to two."""
+    if not isinstance(kind, str) or kind not in (*KINDS, "all"):
+        raise InputError(f"unknown kind of file {described(kind)}: use {', '.join(KINDS)}, or all")
+    return {"all": ALL, "dxf": ("strips", "dxf")}.get(kind, (kind,))
 
 
 def _require(archive: object, force: object, progress: object) -> None:
@@ -151,13 +176,15 @@ def _require(archive: object, force: object, progress: object) -> None:
     require_progress(progress)
 
 
-def _dxf(archive: Archive) -> Files:
+def _dxf(archive: Archive, *, strips: bool = False) -> Files:
+    """The drawing of the strips, or all the others."""
     from rodshell.output.dxf import drawing_dxf
 
     style = archive.results.drawings
     names = style.layers if style else None
     for name, drawing in drawing_set(archive).items():
-        yield f"drawings/{name}.dxf", drawing_dxf(drawing, names)
+        if (name == "strips") == strips:
+            yield f"drawings/{name}.dxf", drawing_dxf(drawing, names)
 
 
 def _svg(archive: Archive) -> Files:
@@ -218,23 +245,30 @@ def _report(archive: Archive) -> Files:
 
 
 KINDS: dict[str, Callable[[Archive], Files]] = {
-    "dxf": _dxf, "svg": _svg, "pdf": _pdf, "csv": _csv,
+    "report": _report, "csv": _csv, "strips": partial(_dxf, strips=True), "dxf": _dxf, "svg": _svg, "pdf": _pdf,
     "obj": lambda archive: _models(archive, "obj", obj_text, shells_among(archive.states)),
     "gltf": lambda archive: _models(archive, "glb", glb_bytes, _meshed(archive, archive.final)),
     "vtp": _vtp,
     "compas": lambda archive: _models(archive, "json", compas_json, _meshed(archive, archive.final)),
-    "3dm": _rhino, "png": _png, "report": _report, "opensees": opensees_files,
+    "png": _png, "3dm": _rhino, "opensees": opensees_files,
 }  # fmt: skip
-DEFAULT = tuple(kind for kind in KINDS if kind not in ("3dm", "opensees"))  # one needs a package, both are for few
+DEFAULT = ("report", "csv", "strips")
+ALL = tuple(kind for kind in KINDS if kind not in ("3dm", "opensees"))  # one needs a package, both are for few
+WORDS = {
+    "report": ["report"], "schedules": ["csv"], "strips": ["strips"], "drawings": ["dxf", "svg"], "PDF": ["pdf"],
+    "models": ["obj", "gltf", "vtp", "compas"], "pictures": ["png"],
+}  # fmt: skip
+"""What the kinds of `ALL` are called where a command says what it has written."""
 
-_DRAWINGS = ("plan", "strips", "supports", "elevations", "bracing", "erection")
+_DRAWINGS = ("plan", "supports", "elevations", "bracing", "erection")
 _STAGES = ("flat", "stage_[0-9]*", f"{POPPED}*")
 
 _SHELLS = (DRAPED, f"{POPPED}*")
 
 NAMES: dict[str, list[str]] = {
+    "strips": ["drawings/strips.dxf"],
     "dxf": [f"drawings/{name}.dxf" for name in _DRAWINGS],
-    "svg": [f"drawings/{name}.svg" for name in _DRAWINGS],
+    "svg": [f"drawings/{name}.svg" for name in (*_DRAWINGS, "strips")],
     "pdf": ["drawings/drawings.pdf"],
     "csv": [f"schedule/{name}.csv" for name in SCHEDULES],
     "obj": [f"model/{state}.obj" for state in _SHELLS],

@@ -31,6 +31,10 @@ class OutputOptions(CheckOptions):
         super().__post_init__()
         instance("fabrication", self.fabrication, Fabrication)
         instance("drawings", self.drawings, DrawingStyle)
+        if self.drawings.files:
+            from rodshell.output.files import wanted_kinds  # here, as it needs the modules of all files
+
+            wanted_kinds(None, self.drawings.files)
         chosen = listed("rod_chosen", self.rod_chosen, 'parts of a rod such as ("section",)')
         for part in chosen:
             choice("each of rod_chosen", part, ("material", "section"))

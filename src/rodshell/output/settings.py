@@ -73,7 +73,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class DrawingStyle:
-    """What the drawings of a set have in common.
+    """What the drawings of a set have in common, and which kinds of files a job writes beyond the usual ones.
 
     Args:
         tolerance: of lengths [m], by which they are also rounded (see `wording.rounding_of`); None:
@@ -90,9 +90,10 @@ class DrawingStyle:
     name: Annotated[str, "title of the drawings; default: the target's name"] = ""
     author: Annotated[str, "who drew them or is responsible for them, for the title block"] = ""
     date: Annotated[IsoDate, 'date for the title block, such as "2026-11-22"; default: today'] = ""
+    files: Annotated[str, 'files beyond the report, schedules and strips, such as "pdf, obj", or "all"'] = ""
 
     def __post_init__(self) -> None:
-        for key in ("paper", "project", "revision", "name", "author", "date"):
+        for key in ("paper", "project", "revision", "name", "author", "date", "files"):
             instance(f"the {key} of drawings", getattr(self, key), str, "text")
         if self.paper not in PAPERS:
             raise InputError(f"unknown paper size {shown(self.paper)}: use {', '.join(PAPERS)}")
@@ -101,4 +102,5 @@ class DrawingStyle:
 
     def parameters(self) -> dict[str, Any]:
         """As it is kept in a result."""
-        return {**vars(self), "layers": Layers.of(self.layers).renamed}
+        kept = {key: value for key, value in vars(self).items() if key != "files"}
+        return {**kept, "layers": Layers.of(self.layers).renamed}

@@ -177,12 +177,12 @@ class _Worker:
             raise _Superseded
 
     def _files(self, order: Order) -> None:
-        """The last form's folder, as `rodshell form` writes it."""
+        """The last form's folder, as `rodshell form --all` writes it."""
         if self._form is None:
             raise InputError("there is no form yet: wait for the verdict")
         packed = BytesIO()
         with tempfile.TemporaryDirectory() as folder:
-            written = self._form.save(Path(folder) / "result")
+            written = self._form.save(Path(folder) / "result", kinds="all")
             with ZipFile(packed, "w", ZIP_DEFLATED) as archive:
                 for path in sorted(written.rglob("*")):
                     if path.is_file():
@@ -190,9 +190,9 @@ class _Worker:
         self._send(order, "files", content=packed.getvalue())
 
     def _job(self, order: Order) -> None:
-        """Find a form and write its folder, as `rodshell form` does."""
+        """Find a form and write its folder, as `rodshell form --all` does."""
         progress = self._progress(order, lambda: False)
-        job_of(order).run(progress=progress, time_limit=order.time_limit).save(order.folder, force=True)
+        job_of(order).run(progress=progress, time_limit=order.time_limit).save(order.folder, kinds="all", force=True)
 
     def _send(self, order: Order, kind: str, facts: Mapping[str, Any] | None = None, content: bytes = b"") -> None:
         self._connection.send(News(order.serial, kind, facts or {}, content))
