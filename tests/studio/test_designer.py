@@ -74,7 +74,7 @@ def visit(request: pytest.FixtureRequest, studio: "tuple[str, Browser]", tmp_pat
     screen, light = request.param
     width, height = SCREENS[screen]
     context = studio[1].new_context(
-        viewport={"width": width, "height": height}, color_scheme=light, device_scale_factor=SCALE
+        viewport={"width": width, "height": height}, color_scheme=light, device_scale_factor=SCALE if width > 1000 else 2 * SCALE
     )
     page, said = context.new_page(), list[str]()
     page.set_default_timeout(60_000)

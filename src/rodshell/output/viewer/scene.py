@@ -245,7 +245,7 @@ def _worst(archive: Archive, shape: Shape, kind: Colour, scale: Scale) -> tuple[
         largest, place = largest_gap(archive, shape)
         return place, wording.millimetres(abs(largest) * 1e-3, rounding=rounding_of(archive.results))
     worst = largest_at(np.abs(scale.values))
-    unit = scale.caption.split(" in ")[-1].split(",")[0]
+    unit = scale.caption.split(" in ", 1)[1].split(",")[0]
     return shape.positions[archive.states["rod_nodes"][worst]], f"{scale.values[worst]:.3g} {unit}"
 
 
