@@ -18,12 +18,12 @@ const set = (tables, path, value) => {
   value === undefined || value === "" ? delete table[last] : (table[last] = value);
 };
 
-const LATTICES = [  // kind, families, name, rods of one family within 24 x 24, and the angles of all families
-  ["chebyshev", 2, "Chebyshev", "M1 9Q12 2 23 9M1 15Q12 8 23 15M1 21Q12 14 23 21", [0, 90]],
-  ["geodesic", 2, "Geodesic", "M1 9Q12 2 23 9M1 12H23M1 15Q12 22 23 15", [0, 90]],
-  ["geodesic", 3, "Geodesic, three families", "M1 8Q12 3 23 8M1 12H23M1 16Q12 21 23 16", [0, 60, 120]],
-  ["asymptotic", 2, "Asymptotic, for saddles", "M1 4Q12 11 23 4M1 12H23M1 20Q12 13 23 20", [45, 135]],
-  ["curves", 2, "Given lines", "M1 6Q8 2 13 8T23 6M1 14Q9 18 23 12", [0, 80]],
+const LATTICES = [  // kind, families, name, rods of one family within 24 x 24, the angles of all families, what it is
+  ["chebyshev", 2, "Chebyshev", "M1 9Q12 2 23 9M1 15Q12 8 23 15M1 21Q12 14 23 21", [0, 90], "Joints at equal distances: flat, the grid is straight and square"],
+  ["geodesic", 2, "Geodesic", "M1 9Q12 2 23 9M1 12H23M1 15Q12 22 23 15", [0, 90], "Laths that lie flat on the surface, straight when they are unrolled"],
+  ["geodesic", 3, "Geodesic, three families", "M1 8Q12 3 23 8M1 12H23M1 16Q12 21 23 16", [0, 60, 120], "Laths that lie flat on the surface, with triangles between them"],
+  ["asymptotic", 2, "Asymptotic, for saddles", "M1 4Q12 11 23 4M1 12H23M1 20Q12 13 23 20", [45, 135], "Strips upright on a surface that curves both ways, as a saddle does"],
+  ["curves", 2, "Given lines", "M1 6Q8 2 13 8T23 6M1 14Q9 18 23 12", [0, 80], "Rods along the lines that the case gives"],
 ];
 const SLIDERS = [  // key, name, and how its range follows from its value
   ["layout.spacing", "Spacing", "length"], ["layout.rotate", "Heading", "angle"],
@@ -473,9 +473,9 @@ function showFound() {
 // Lattices as pictures; the one whose rods are given is shown only where a case has it.
 function addLattices(folder) {
   const now = base.layout?.kind || "chebyshev", families = get(base, "layout.families") ?? 2;
-  folder.$children.prepend(make("div", { className: "lattices", role: "group", ariaLabel: "Lattice" }, ...LATTICES.filter(([kind]) => kind !== "curves" || kind === now).map(([kind, count, name, rods, angles]) => {
+  folder.$children.prepend(make("div", { className: "lattices", role: "group", ariaLabel: "Lattice" }, ...LATTICES.filter(([kind]) => kind !== "curves" || kind === now).map(([kind, count, name, rods, angles, title]) => {
     const picture = drawn2d("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, ...angles.map((angle, k) => drawn2d("path", { d: rods, transform: `rotate(${angle} 12 12)`, class: "uvw"[k] })));
-    const button = make("button", { type: "button", ariaPressed: String(kind === now && (kind !== "geodesic" || count === families)), title: start.keys.find(({ path }) => path === "layout.kind").help, onclick: () => {
+    const button = make("button", { type: "button", ariaPressed: String(kind === now && (kind !== "geodesic" || count === families)), title, onclick: () => {
       change(next => {
         forget(next, "layout.kind", kind);
         set(next, "layout.kind", kind);
