@@ -34,7 +34,8 @@ const SLIDERS = [  // key, name, and how its range follows from its value
 ];
 const MOST = { snow: 3, wind: 1.5 };  // kN/m2, at the ends of their sliders
 const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["drape.method", "Drape"]];
-const CABLES = { section: "rod 6", material: { preset: "steel" }, prestrain: 0.0005, ends_at: "supports" };  // those that a design to loads begins with
+const CABLES = { section: "rod 6", material: { preset: "spring-steel", youngs_modulus: "160 GPa" }, prestrain: 0.0005, ends_at: "supports" };  // of design.py
+const THIN = 25, THIN_CABLE = "rod 4";  // mm: depth of rods up to which cables are so thin
 const GROUPS = {
   target: "Target", layout: "Lattice", rod: "Rods", "rod.section": "Section of the rods", "rod.material": "Material of the rods", joint: "Joints",
   drape: "Draping", pop_up: "Supports", refine: "Refinement", seams: "Seams", checks: "Checks", fabrication: "Fabrication", drawings: "Drawings",
@@ -434,7 +435,7 @@ function buildControls() {
   addMaterial(design);
   addSection(design);
   for (const kind of Object.keys(MOST)) addLoad(design, kind);
-  addKey(design, known.find(({ path }) => path === "bracing.kind"), "Bracing", (next, kind) => { if (kind === "cables") Object.assign(next.bracing, clone(CABLES)); });
+  addKey(design, known.find(({ path }) => path === "bracing.kind"), "Bracing", (next, kind) => { if (kind === "cables") Object.assign(next.bracing, clone(CABLES), /[\d.]+/.exec(figure("section"))?.[0] <= THIN ? { section: THIN_CABLE } : {}); });
   for (const [path, name] of FIRST) addKey(design, known.find(key => key.path === path), name);
   design.domElement.after(searching);
   const inTables = known.filter(key => key.path.includes("."));
@@ -488,7 +489,7 @@ function addLattices(folder) {
   })));
 }
 
-const figure = name => facts?.figures.find(([one]) => one === name)?.[1];
+const figure = name => (resolved ? facts?.figures.find(([one]) => one === name)?.[1] : undefined);  // of this target
 const materialOf = () => get(base, "rod.material.preset") || (isTable(base.rod?.material) ? "" : figure("material")) || "";
 
 // Another material brings its own sections: one that it is not sold in is left to be chosen.
@@ -584,7 +585,7 @@ function addKey(folder, key, label = "", also = () => {}) {
   const holder = { value: text };
   const name = label || (symbol ? `${nameOf(key)} [${symbol}]` : nameOf(key));
   const given = get(resolved, key.path), shownAs = Array.isArray(given) ? given.join(", ") : String(given ?? "default");
-  const choices = { [`default: ${shownAs}`]: "", ...Object.fromEntries(key.choices.map(word => [word, String(word)])) };
+  const choices = { [given === undefined ? "default" : `default: ${shownAs}`]: "", ...Object.fromEntries(key.choices.map(word => [word, String(word)])) };
   const controller = key.choices.length && !key.any_value ? folder.add(holder, "value", choices) : folder.add(holder, "value");
   controller.name(name);
   controller.onFinishChange(() => {
