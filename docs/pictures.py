@@ -1,10 +1,15 @@
-"""Makes the pictures of the README and of the lattices: `python docs/pictures.py`."""
+"""Makes the pictures of the README, of the lattices and of the studio: `python docs/pictures.py`."""
 
+import re
 from io import BytesIO
 from pathlib import Path
 from runpy import run_path
+from shutil import which
+from subprocess import PIPE, Popen
+from tempfile import TemporaryDirectory
 
 from PIL import Image
+from playwright.sync_api import sync_playwright
 
 from rodshell.job import Job
 from rodshell.output.pictures import picture, picture_svg
@@ -16,6 +21,8 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 LATTICES = ("chebyshev", "geodesic", "three_families", "asymptotic")  # examples of this name
 STAGES, PAUSE, STEP = 24, 1500, 100  # of the deployment that moves; ms
 WIDE = 600  # pixels
+SCREEN = {"width": 1280, "height": 860}
+GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
 def main() -> None:
@@ -26,6 +33,29 @@ def main() -> None:
     for name in LATTICES:
         archive = run_path(str(EXAMPLES / f"{name}.py"))["form"].archive()
         (FOLDER / f"{name}.png").write_bytes(drawing_png(picture(archive, "popped_pinned")))
+    (FOLDER / "studio.png").write_bytes(studio_page())
+
+
+def studio_page() -> bytes:
+    """The studio's first page in Chromium, by Playwright."""
+    chromium = next(path for name in ("chromium", "chromium-browser", "google-chrome") if (path := which(name)))
+    options = ("--no-browser", "--no-token", "--port", "0", "--folder")
+    with TemporaryDirectory() as folder, sync_playwright() as play:
+        server = Popen(["rodshell", "studio", *options, folder], stderr=PIPE, text=True)
+        try:
+            assert server.stderr is not None
+            address = re.search(r"http://\S+", server.stderr.readline())
+            assert address is not None
+            page = play.chromium.launch(executable_path=chromium, args=GL).new_page(viewport=SCREEN)
+            page.goto(address[0])
+            page.wait_for_selector("#verdict.good:not(.old)")
+            page.wait_for_timeout(PAUSE)
+            small = Image.open(BytesIO(page.screenshot())).convert("RGB").quantize(128)
+        finally:
+            server.terminate()
+    file = BytesIO()
+    small.save(file, "PNG", optimize=True)
+    return file.getvalue()
 
 
 def moving(archive: Archive) -> bytes:

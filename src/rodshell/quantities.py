@@ -33,12 +33,14 @@ class Value:
         words: that it may also be.
         role: "name": it is text that is not empty; "file": the path of a file to be read; "folder": of one to be
             written.
+        unit: of a number without a unit, or of several; "" where that has none.
     """
 
     read: _Reader
     check: Callable[[str, Any], Any] | None = None
     words: tuple[str, ...] = ()
     role: Literal["", "name", "file", "folder"] = ""
+    unit: str = ""
 
 
 def quantity(kind: Kind, sign: _Sign = number, unit: str | None = None) -> Value:
@@ -56,7 +58,7 @@ def quantity(kind: Kind, sign: _Sign = number, unit: str | None = None) -> Value
             raise ValueError(f"must not be negative; give {wanted(kind)}")
         return found
 
-    return Value(read, lambda name, value: sign(name, value, si))
+    return Value(read, lambda name, value: sign(name, value, si), unit=si_unit(kind))
 
 
 def _or_auto(value: Value) -> Value:
@@ -68,7 +70,7 @@ def _or_auto(value: Value) -> Value:
         except ValueError as reason:
             raise ValueError(f'{reason}, or "auto"') from None
 
-    return Value(read)
+    return Value(read, unit=value.unit)
 
 
 def pair(value: Value, words: str, *, one_for_both: bool = False) -> Value:
@@ -105,7 +107,10 @@ def _several(count: int, value: Value, needs: str, words: str, *, one_for_all: b
             raise ValueError(needs)
         return tuple(_named(ordinal, value, item) for ordinal, item in zip(_ORDER, items, strict=False))
 
-    return Value(read, lambda name, given: tuple(check(name, item) for item in numbers(name, given, words, count)))
+    def checked(name: str, given: Any) -> tuple[float, ...]:
+        return tuple(check(name, item) for item in numbers(name, given, words, count))
+
+    return Value(read, checked, unit=value.unit)
 
 
 def _parted(value: object) -> object:

@@ -213,7 +213,7 @@ def start(robot: Robot, name: str, mesh: Path) -> None:
         return
     page.set_input_files("#file", mesh)
     page.wait_for_selector("#verdict.failed")  # a mesh needs its unit
-    page.locator(".lil-title", has_text="[target]").click()
+    page.locator(".lil-title", has_text=re.compile("^Target$")).click()
     field = page.locator("input[aria-label^='unit:']").first
     field.fill("m")
     field.press("Enter")

@@ -430,6 +430,7 @@ def test_each_family_has_its_name_and_its_colour() -> None:
     scene = scene_of(kept(three))
     assert scene is not None
     assert {rod["id"][0]: rod["ink"] for rod in scene.header["rods"]} == dict(zip("UVW", FAMILIES, strict=True))
+    assert scene.header["families"] == list(zip("uvw", FAMILIES, strict=True))  # of the viewer's legend
     assert {rod.family for rod in rods_of(kept(curved()))} == {"free"}
     plan = flat_drawing(flat_plan(kept(low())), 20.0)
     pens = {path.name[0]: path.pen.colour for path in plan.paths if path.name and path.pen}

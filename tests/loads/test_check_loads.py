@@ -85,6 +85,18 @@ def test_snow_and_wind_have_the_sums_of_their_surface() -> None:
     assert drift[right, 2].sum() / drift[~right, 2].sum() == pytest.approx(2.0, rel=0.1)
 
 
+def test_wind_on_a_dome_presses_its_edge_and_lifts_its_middle_whatever_its_size() -> None:
+    """Along 4 m of plan and along 40 m: 0.5 of the pressure at the windward edge, -0.8 half-way, -0.2 in the lee."""
+    for size in (2.0, 20.0):
+        plan = np.column_stack([np.linspace(0.0, 2.0 * size, 5), np.zeros(5)]) + [7.0, 3.0]
+        one, up = np.ones(5), np.tile([0.0, 0.0, 1.0], (5, 1))
+        nodes = LoadedNodes(np.column_stack([plan, np.zeros(5)]), one, Tributary(one, one, up, plan), 0.01)
+        pressed = -rs.Wind(3.0, "dome").forces(nodes)[:, 2] / 3.0
+        assert pressed[[0, 2, 4]] == pytest.approx([0.5, -0.8, -0.2])
+        turned = -rs.Wind(3.0, "dome", direction=pi).forces(nodes)[:, 2] / 3.0
+        assert turned == pytest.approx(pressed[::-1])
+
+
 def test_half_of_a_plan_is_what_lies_beyond_the_middle_of_its_extent() -> None:
     """Of a right triangle three quarters towards its right angle's far side or a quarter, and of a drift both halves:
     a triangle's load on each side of the middle."""

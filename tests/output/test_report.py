@@ -140,6 +140,7 @@ def test_colours_of_the_view_mean_what_stands_at_their_own_bar() -> None:
             if shown is None:
                 continue
             colours = stage["colours"][kind]
+            assert colours["worst"]["text"].split()[-1] == {"stress": "%", "gap": "mm", "curvature": "1/m"}[kind]
             (share, least), *_, (stop, most) = [(at, float(text)) for at, text in colours["ticks"]]
             last = len(header["palettes"][kind]) - 1
             above = array(colours["bins"]) == last if header["palettes"][kind][-1] == ABOVE else np.False_

@@ -321,7 +321,7 @@ def test_a_case_that_failed_offers_no_files_and_no_script_of_the_case_before(stu
     offered = [page.locator(part) for part in ("#download[href]", "#python:enabled", "#keep button:enabled")]
     for part in offered:
         expect(part).to_have_count(1)
-    page.locator(".lil-title", has_text="[layout]").click()
+    page.locator(".lil-title", has_text="Lattice").click()
     page.set_viewport_size({"width": 1440, "height": 400})
     page.locator("#compare").scroll_into_view_if_needed()
     assert page.evaluate(SCROLLED) > 0
@@ -384,11 +384,12 @@ def test_the_dialog_of_loads_keeps_those_that_the_case_has(studio: Studio) -> No
     assert case["loads"][0]["kind"] == "wind"
     assert case["loads"][1]["cladding"] == "2 kg/m2"
     assert case["loads"][2] == {"name": "snow", "kind": "snow", "value": "0.3 kN/m2"}
-    assert case["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0, "snow": 1}}]
+    storm = {"name": "storm", "factors": {"gale": 1.5, "weight": 1.0}}
+    assert case["combinations"] == [storm, {"name": "winter", "factors": {"weight": 1.35, "snow": 1.5}}]
     page.fill("input[name=snow]", "")
     page.click("#load-values button[value=check]")
     page.click("#loads")
-    assert linked(page)["combinations"] == [{"name": "storm", "factors": {"gale": 1.5, "weight": 1.0}}]
+    assert linked(page)["combinations"] == [storm]
     assert studio.errors() == []
 
 
@@ -455,7 +456,7 @@ def test_the_dialog_of_loads_opens_whatever_a_case_has_in_their_place(studio: St
         page.click("#load-values button[value=check]")
         page.wait_for_selector("#verdict:not(.failed):not(.old)")
         assert {load["kind"] for load in linked(page)["loads"]} == {"snow", "self_weight"}
-        assert [row["name"] for row in linked(page)["combinations"]] == ["service"]
+        assert [row["name"] for row in linked(page)["combinations"]] == ["permanent", "winter"]
     assert studio.errors() == []
 
 
@@ -494,8 +495,8 @@ def test_an_outline_ends_the_target_that_there_is_and_a_new_state_of_a_mesh_keep
     expect(page.locator(SPACING)).to_have_count(1)  # in the folder of the layout: no slider with the dome's spacing
     slider = f".lil-slider + {SPACING}"
     page.wait_for_selector(slider)
-    assert len(page.input_value(slider)) <= 5  # m, of a chosen spacing: four digits say enough
-    put(page, slider, "1")
+    assert len(page.input_value(slider)) <= 5  # mm, of a chosen spacing: four digits say enough
+    put(page, slider, "1000")
     page.wait_for_selector(CURRENT)
     rods = page.inner_text("#figures td >> nth=1")
     page.set_input_files("#file", tmp_path / "edge.dxf")

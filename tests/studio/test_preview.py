@@ -51,7 +51,7 @@ def test_a_preview_shows_what_the_archive_shows(case: dict[str, Any], until: Any
     kept = scene_of(form.unchecked())
     assert kept is not None
     (ours, our_array), (theirs, their_array) = read(content), read(kept.content())
-    for name in ("name", "rods", "kinds", "palettes", "outline", "size", "low", "box"):
+    for name in ("name", "rods", "families", "kinds", "palettes", "outline", "size", "low", "box"):
         assert ours[name] == theirs[name]
     assert [stage["name"] for stage in ours["stages"]] == [stage["name"] for stage in theirs["stages"]]
     for one, other in zip(ours["stages"], theirs["stages"], strict=True):
@@ -98,6 +98,23 @@ def test_the_plan_has_the_cut_lengths_that_the_schedule_has() -> None:
     for facts in (before, after):
         assert {rod["id"]: rod["length"] for rod in facts["plan"]} == pytest.approx(lengths, rel=1e-12)
     assert dict(before["figures"]).items() <= dict(after["figures"]).items()
+
+
+def test_figures_name_section_and_material_as_the_trade_does_and_all_lengths_in_mm() -> None:
+    rod = {"section": "tube 3x0.5", "material": {"preset": "gfrp"}}
+    job = rs.Job.load({**DOME, "rod": rod, "pop_up": {"ends": "clamped"}})
+    form = job.run()
+    live, (facts, _) = dict(Preview().of(form)[0]["figures"]), checked(form, job)
+    figures, lengths = dict(facts["figures"]), [rod["length"] for rod in facts["plan"]]
+    assert (live["section"], live["material"]) == ("tube 3 x 0.5 mm", "gfrp")
+    assert live.items() <= figures.items()
+    for name, metres in (("all rods together", sum(lengths)), ("longest rod", max(lengths))):
+        number, unit = figures[name].split()
+        assert unit == "mm"
+        assert float(number) == pytest.approx(1e3 * metres, rel=1e-3)
+    mass, unit = figures["mass"].split()
+    assert unit == "kg"
+    assert float(mass) == pytest.approx(np.pi * 2.5e-3 * 0.5e-3 * 1850.0 * sum(lengths), rel=5e-3)  # three digits
 
 
 @pytest.mark.slow

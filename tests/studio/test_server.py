@@ -225,6 +225,13 @@ def test_names_of_uploads_are_plain() -> None:
 
 def test_every_file_that_the_page_offers_can_be_uploaded(client: TestClient) -> None:
     start, session = client.get("/api/start").json(), new_session(client)
+    units = {key["path"]: key["unit"] for key in start["keys"]}
+    assert [units[path] for path in ("layout.spacing", "layout.rotate", "rod.material.density")] == [
+        "m",
+        "rad",
+        "kg/m3",
+    ]
+    assert "lath 12 x 30 mm" in start["sold"]["larch"]
     for suffix in (*start["surfaces"], *start["outlines"]):
         answer = client.post(f"/api/sessions/{session}/uploads?name=roof{suffix}", content=b"v")
         assert answer.json() == {"file": f"upload:roof{suffix}"}

@@ -10,6 +10,7 @@ from typing import Any
 from rodshell import schema
 from rodshell.case.case import Case
 from rodshell.case.stage_tables import IDLE
+from rodshell.quantities import Value
 from rodshell.schema import Place, keys_in, kind_of
 from rodshell.units import shown
 from rodshell.validation import either
@@ -35,6 +36,7 @@ class CaseKey:
         choices: the words that it may take, where it is a choice.
         any_value: whether it may take values other than these words.
         reads_file: whether it names a file.
+        unit: of a number without a unit; "" where it has none.
     """
 
     path: str
@@ -43,6 +45,7 @@ class CaseKey:
     choices: tuple[str, ...] = ()
     any_value: bool = True
     reads_file: bool = False
+    unit: str = ""
 
     @property
     def table(self) -> str:
@@ -91,8 +94,8 @@ def _keys_of(table: type, prefix: str = "", kinds: tuple[str, ...] = ()) -> Iter
         if field is None or field.rows or not field.tables:
             help_ = field.help.replace(field.name, name) if field else f"kind of {prefix.rstrip('.')}"
             words, others = (field.choices, field.any_value) if field else (kinds, False)
-            reads = bool(field and field.value and field.value.role == "file")
-            yield CaseKey(path, help_, kinds, words, others, reads)
+            value = field.value if field and field.value else Value(str)
+            yield CaseKey(path, help_, kinds, words, others, value.role == "file", value.unit)
             continue
         if field.value is not None:
             yield CaseKey(path, field.help, kinds)

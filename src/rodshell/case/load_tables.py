@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
-from rodshell.loads.kinds import Load
+from rodshell.loads.kinds import DOME, Load
 from rodshell.loads.settings import Bracing, PartOfSpan
 from rodshell.quantities import Name, Share, Value
 from rodshell.rods.design_strength import Duration
@@ -36,16 +36,14 @@ class Combination:
 
 OWN, ACTING = 1.35, 1.5  # factors of permanent loads and of others [EN 1990, table A1.2(B), set B]
 LIFTING = 1.0  # factor of a weight that holds the shell down
-PRESSED, CROWN, LEE = 0.5, -0.8, -0.2  # coefficients of wind, of low domes [after EN 1991-1-4, 7.2.8]
 DIRECTIONS = 4
 
 
-def usual_loads(snow: str | None = None, wind: str | None = None, *, size: float = 0.0) -> dict[str, object]:
+def usual_loads(snow: str | None = None, wind: str | None = None) -> dict[str, object]:
     """Own weight, and snow and wind where there are some, in the usual combinations: overrides for a case.
 
     Args:
         snow, wind: load on the plan, velocity pressure, such as "0.5 kN/m2".
-        size: half the shell's width [m], over which the wind's coefficient runs from its windward edge to its lee.
     """
     loads: list[dict[str, object]] = [{"name": "own", "kind": "self_weight"}]
     combinations: list[dict[str, object]] = [{"name": "permanent", "factors": {"own": OWN}}]
@@ -53,9 +51,7 @@ def usual_loads(snow: str | None = None, wind: str | None = None, *, size: float
         loads.append({"name": "snow", "kind": "snow", "value": snow})
         combinations.append({"name": "winter", "factors": {"own": OWN, "snow": ACTING}})
     if wind is not None:
-        tilt, bend = 0.5 * (LEE - PRESSED) / size, (0.5 * (LEE + PRESSED) - CROWN) / size**2
-        along = f"{CROWN:g} - {-tilt:.9g}*x + {bend:.9g}*x^2"
-        loads.append({"name": "wind", "kind": "wind", "value": wind, "coefficient": along, "directions": DIRECTIONS})
+        loads.append({"name": "wind", "kind": "wind", "value": wind, "coefficient": DOME, "directions": DIRECTIONS})
         combinations.append({"name": "storm", "factors": {"own": LIFTING, "wind": ACTING}})
     return {"loads": loads, "combinations": combinations}
 

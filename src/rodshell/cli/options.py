@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from rodshell.case import Case, CaseKey, case_keys, load_case
-from rodshell.case.held import built
 from rodshell.case.keys import BY_KIND, keys_of_kinds
 from rodshell.case.load_tables import usual_loads
 from rodshell.errors import InputError
@@ -189,10 +188,7 @@ def under_usual_loads(
         return load_case(name, overrides)
     if "loads" in overrides:
         raise InputError("--loads FILE has loads of its own: leave it out, or --snow, --wind and --own")
-    size = 0.0
-    if wind is not None:
-        size = built(load_case(name, overrides).target).size
-    return load_case(name, {**overrides, **usual_loads(snow, wind, size=size)})
+    return load_case(name, {**overrides, **usual_loads(snow, wind)})
 
 
 def wanted_kinds(only: str | None) -> list[str] | None:

@@ -110,8 +110,12 @@ class Snow:
         return nodes.downwards(self.value * share * plan)
 
 
+DOME = "dome"
+_DOME = "-0.8 - 0.35*x + 0.95*x^2"  # 0.5 at its windward edge, x = -1, and -0.2 at its lee, x = 1
+
+
 def _coefficient(value: object) -> float | str:
-    """A number, or a formula."""
+    """A number, a formula, or "dome"."""
     try:
         return read_quantity(value, "number")
     except ValueError:
@@ -126,7 +130,8 @@ class Wind:
 
     Args:
         coefficient: pressure coefficient, positive towards the surface from above: a number, or a formula in x along
-            the wind and y across it, from the middle of the plan's extent in both [m], such as "-1.2 + 0.1*x".
+            the wind and y across it, from the middle of the plan's extent in both [m], such as "-1.2 + 0.1*x"; or
+            "dome": about that of low domes [after EN 1991-1-4, 7.2.8], from the windward edge of the plan to its lee.
     """
 
     kind: ClassVar = "wind"
@@ -135,7 +140,7 @@ class Wind:
     coefficient: Annotated[
         float | str,
         Value(_coefficient),
-        "pressure coefficient, positive onto the shell: a number, or a formula in x along the wind and y",
+        'pressure coefficient, positive onto the shell: a number, "dome", or a formula in x along the wind and y',
     ]
     direction: Annotated[Angle, "in which the wind blows, seen from above"] = 0.0
     directions: Annotated[Whole, "number of directions, all around from that one: a combination for each"] = 1
@@ -171,7 +176,7 @@ class Wind:
             return None
         from rodshell.targets.heightfield import parse_formula  # here, as it needs SciPy
 
-        return parse_formula(self.coefficient)
+        return parse_formula(_DOME if self.coefficient == DOME else self.coefficient)
 
     def forces(self, nodes: "LoadedNodes") -> Floats:
         """(n, 3) [N].
@@ -182,6 +187,7 @@ class Wind:
         coefficient = np.full(len(nodes.positions), 0.0 if self._formula else float(self.coefficient))
         if self._formula is not None:
             x, y = nodes.along(self.direction).T
+            x = x / np.abs(x).max() if self.coefficient == DOME else x
             with np.errstate(all="ignore"):  # what is not finite is refused
                 coefficient = np.broadcast_to(np.asarray(self._formula(x, y), dtype=float), x.shape)
             if not np.isfinite(coefficient).all():

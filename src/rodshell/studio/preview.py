@@ -20,6 +20,7 @@ from rodshell.output.sections import section_outline
 from rodshell.output.viewer.scene import Coloured, Drawn, scene_of
 from rodshell.results import Archive, wording
 from rodshell.results.facts import facts as facts_of
+from rodshell.results.facts import mass_text
 from rodshell.results.from_form import rod_type
 from rodshell.schema import written
 from rodshell.targets import Target
@@ -99,9 +100,14 @@ def figures(form: Form) -> Figures:
     """Figures of a form in words, by their names."""
     found, rounding = [rod.length for rod in form.footprint.rods], rounding_of(form)
     angles = [part.draped.figures.min_angle for part in form.stages.parts]
-    rows = [("rods", str(len(found))), ("all rods together", f"{sum(found):.4g} m")]
+    rows = [("rods", str(len(found)))]
     if found:
+        rows.append(("all rods together", wording.millimetres(sum(found), 4, rounding)))
         rows.append(("longest rod", wording.millimetres(max(found), 5, rounding)))
+    rod = rod_type(form.rod)
+    rows.append(("section", wording.section_text(rod.section)))
+    if rod.preset and rod.preset.name:
+        rows.append(("material", rod.preset.name))
     if angles:
         rows.append(("smallest angle between rods", wording.degrees(degrees(min(angles)))))
     for ends, gap in form.agreement.items():
@@ -178,7 +184,8 @@ def _resolved(form: Form) -> dict[str, Any]:
 
 def _checked(archive: Archive) -> Figures:
     """Figures of checks, refinement and loads, by which variants are compared."""
-    results, rows = archive.results, []
+    results = archive.results
+    rows = [("mass", mass)] if (mass := mass_text(results)) else []
     for shape, bent in (results.bending.shapes() if results.bending else {}).items():
         if shape not in OTHER_SHAPES and bent.utilisation is not None:
             rows.append((f"utilisation, {shape}, unloaded", wording.percent(bent.utilisation)))

@@ -23,8 +23,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rodshell.case.keys import case_keys
 from rodshell.case.link import LARGEST, LARGEST_UPLOAD, OUTLINES, SURFACES, UPLOAD, require_small, upload_name
+from rodshell.case.load_tables import usual_loads
 from rodshell.errors import InputError
 from rodshell.output.viewer import viewer_script, viewer_style
+from rodshell.rods.section import TRADE_SIZES, size_text
 from rodshell.studio.jobs import Jobs
 from rodshell.studio.kept import Room
 from rodshell.studio.session import Session, Sessions, presets
@@ -208,11 +210,12 @@ async def _version(_: Request) -> Response:
 
 
 async def _start(request: Request) -> Response:
-    """What the page needs once: the keys of a case, the built-in cases, kinds of files, and the case to begin with."""
+    """What the page needs once: the keys of a case, built-in cases and loads, sections, the case to begin with."""
     keys = [vars(key) for key in case_keys().values()]
     first = request.app.state.sessions.first
-    files = {"surfaces": SURFACES, "outlines": OUTLINES}
-    return JSONResponse({"keys": keys, "presets": presets(), **files, "first": first, "largest": limit(LARGEST)})
+    known = {"surfaces": SURFACES, "outlines": OUTLINES, "presets": presets(), "usual": usual_loads("0", "0")}
+    known["sold"] = {material: [size_text(size) for size in sizes] for material, sizes in TRADE_SIZES.items()}
+    return JSONResponse({"keys": keys, "first": first, "largest": limit(LARGEST), **known})
 
 
 async def _new_session(request: Request) -> Response:

@@ -106,7 +106,8 @@ class Drawn:
         laths = _laths(outline)
         known = {kind: coloured.scale for _, colours in self.shapes for kind, coloured in colours.items()}
         shown = {kind: known[kind] for kind in COLOURS if kind in known}
-        families = grid.family_numbers(family for _, family in self.rods)
+        families = dict.fromkeys(family for _, family in self.rods)
+        inks = {family: FAMILIES[k % len(FAMILIES)] for k, family in enumerate(families)}
         header: dict[str, Any] = {
             "version": VERSION,
             "name": self.name,
@@ -114,9 +115,10 @@ class Drawn:
             "low": low.tolist(),
             "box": (size / frame.size).tolist(),
             "rods": [
-                {"id": name, "count": count, "ink": FAMILIES[family % len(FAMILIES)]}
-                for (name, _), count, family in zip(self.rods, counts.tolist(), families, strict=True)
+                {"id": name, "count": count, "ink": inks[family]}
+                for (name, family), count in zip(self.rods, counts.tolist(), strict=True)
             ],
+            "families": list(inks.items()),
             "joints": {"ids": list(self.joints), "entries": frame.put(meeting)},
             "outline": (outline / frame.size).tolist(),
             "kinds": {kind: scale.caption.split(" in ")[0] for kind, scale in shown.items()},
@@ -243,7 +245,7 @@ def _worst(archive: Archive, shape: Shape, kind: Colour, scale: Scale) -> tuple[
         largest, place = largest_gap(archive, shape)
         return place, wording.millimetres(abs(largest) * 1e-3, rounding=rounding_of(archive.results))
     worst = largest_at(np.abs(scale.values))
-    unit = scale.caption.split(" in ")[-1].split(",")[0]
+    unit = scale.caption.split(" in ", 1)[1].split(",")[0]
     return shape.positions[archive.states["rod_nodes"][worst]], f"{scale.values[worst]:.3g} {unit}"
 
 

@@ -18,6 +18,13 @@ const set = (tables, path, value) => {
   value === undefined || value === "" ? delete table[last] : (table[last] = value);
 };
 
+const LATTICES = [  // kind, families, name, rods of one family within 24 x 24, the angles of all families, what it is
+  ["chebyshev", 2, "Chebyshev", "M1 9Q12 2 23 9M1 15Q12 8 23 15M1 21Q12 14 23 21", [0, 90], "Joints at equal distances: flat, the grid is straight and square"],
+  ["geodesic", 2, "Geodesic", "M1 9Q12 2 23 9M1 12H23M1 15Q12 22 23 15", [0, 90], "Laths that lie flat on the surface, straight when they are unrolled"],
+  ["geodesic", 3, "Geodesic, three families", "M1 8Q12 3 23 8M1 12H23M1 16Q12 21 23 16", [0, 60, 120], "Laths that lie flat on the surface, with triangles between them"],
+  ["asymptotic", 2, "Asymptotic, for saddles", "M1 4Q12 11 23 4M1 12H23M1 20Q12 13 23 20", [45, 135], "Strips upright on a surface that curves both ways, as a saddle does"],
+  ["curves", 2, "Given lines", "M1 6Q8 2 13 8T23 6M1 14Q9 18 23 12", [0, 80], "Rods along the lines that the case gives"],
+];
 const SLIDERS = [  // key, name, and how its range follows from its value
   ["layout.spacing", "Spacing", "length"], ["layout.rotate", "Heading", "angle"],
   ["layout.crossing", "Crossing", "crossing"],
@@ -25,7 +32,25 @@ const SLIDERS = [  // key, name, and how its range follows from its value
   ["target.b", "Half-axis y", "length"], ["target.c", "Half-axis z", "length"], ["target.base", "Base plane", "place"],
   ["target.scale", "Scale", "factor"],
 ];
-const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["rod.section", "Section"], ["rod.material.preset", "Material"], ["drape.method", "Drape"]];
+const MOST = { snow: 3, wind: 1.5 };  // kN/m2, at the ends of their sliders
+const FIRST = [["pop_up.ends", "Ends"], ["joint.kind", "Joints"], ["drape.method", "Drape"]];
+const CABLES = { section: "rod 6", material: { preset: "spring-steel", youngs_modulus: "160 GPa" }, prestrain: 0.0005, ends_at: "supports" };  // of design.py
+const THIN = 25, THIN_CABLE = "rod 4";  // mm: depth of rods up to which cables are so thin
+const GROUPS = {
+  target: "Target", layout: "Lattice", rod: "Rods", "rod.section": "Section of the rods", "rod.material": "Material of the rods", joint: "Joints",
+  drape: "Draping", pop_up: "Supports", refine: "Refinement", seams: "Seams", checks: "Checks", fabrication: "Fabrication", drawings: "Drawings",
+  "drawings.layers": "Layers of DXF files", bracing: "Bracing", "bracing.section": "Section of the bracing", "bracing.material": "Material of the bracing",
+  locked_joints: "Locked joints", stability: "Stability", strength: "Strength", design: "Design to loads",
+};
+const NAMES = {
+  a: "half-axis a", b: "half-axis b", c: "half-axis c", EA: "axial stiffness EA", EI1: "bending stiffness EI1", EI2: "bending stiffness EI2", GJ: "twist stiffness GJ",
+  C1: "stiffness C1", C2: "stiffness C2", youngs_modulus: "Young's modulus", poisson_ratio: "Poisson's ratio", preset: "named material", section: "in words",
+};
+const UNITS_SHOWN = { m: ["mm", 1000], rad: ["\u00b0", 180 / Math.PI] };  // of the page, for those of a case
+const unitOf = ({ unit }) => UNITS_SHOWN[unit] || [unit, 1];
+const tableOf = ({ path }) => (path in GROUPS ? path : path.replace(/\.[^.]*$/, ""));
+const groupOf = key => GROUPS[tableOf(key)] || tableOf(key).replaceAll(/[._]/g, " ");
+const nameOf = ({ path }) => { const name = path.split(".").at(-1); return NAMES[name] || name.replaceAll("_", " "); };
 const TIMEOUT = 1500;  // ms after which a lost connection is tried again
 const TABS = 1000;  // serials modulo TABS tell which tab sent a case: the server numbers its pages
 const mine = number => number % TABS === tab;
@@ -102,7 +127,7 @@ function showTools() {
 }
 
 // The dialog edits the case's own weight and snow; its other loads and its combinations stay unless they are removed.
-const EDITED = [["self_weight", "own", "cladding"], ["snow", "snow", "value"]];  // kind, name if it is new, key
+const EDITED = [["self_weight", "cladding"], ["snow", "value"]];  // kind, key
 const tablesIn = value => (Array.isArray(value) ? value.filter(isTable) : []);  // a case from a link may hold anything
 const words = value => (typeof value === "string" ? value : JSON.stringify(value));
 
@@ -111,7 +136,7 @@ function showLoads(wrong = null) {
   const loads = tablesIn(base.loads), { elements } = byId("load-values").querySelector("form");
   const isWrong = (noun, table) => wrong?.noun === noun && base[`${noun}s`]?.[wrong.number - 1] === table;
   let first = null;  // field or row that is wrong
-  for (const [kind, , key] of EDITED) {
+  for (const [kind, key] of EDITED) {
     const found = loads.find(load => load.kind === kind), given = found?.[key] ?? (kind === "snow" && loads.length ? "" : elements[kind].defaultValue);
     elements[kind].value = typeof given === "number" ? `${given} ${elements[kind].dataset.unit}` : words(given);
     if (found && isWrong("load", found)) first = elements[kind];
@@ -139,34 +164,55 @@ function showLoads(wrong = null) {
 let dropped = [];  // tables of the case that the dialog is to remove
 
 function checkLoads(elements) {
-  const kept = name => tablesIn(base[name]).filter(table => !dropped.includes(table));
-  const gone = dropped.map(({ name }) => name);
-  const found = clone({ loads: kept("loads"), combinations: kept("combinations").map(table => ({ ...table, factors: isTable(table.factors) ? table.factors : {} })) });
+  const [lost, left] = ["loads", "combinations"].map(name => dropped.map(table => base[name]?.indexOf?.(table) ?? -1));
   change(next => {
-    Object.assign(next, found);
-    for (const [kind, plain, key] of EDITED) {
-      const text = elements[kind].value.trim(), load = next.loads.find(load => load.kind === kind);
-      if (load && text) load[key] = text;
-      else if (load) { next.loads = next.loads.filter(other => other !== load); gone.push(load.name); }
-      else if (text) {
-        let name = plain;
-        while (next.loads.some(load => load.name === name)) name += "_";
-        next.loads.push({ name, kind, [key]: text });
-        for (const { factors } of next.combinations) factors[name] = 1;
-      }
-    }
-    const names = next.loads.map(({ name }) => name);
-    for (const { factors } of next.combinations) for (const name of gone) if (!names.includes(name)) delete factors[name];
-    next.combinations = next.combinations.filter(({ factors }) => Object.keys(factors).length);
-    if (!next.combinations.length) next.combinations.push({ name: "service", factors: Object.fromEntries(names.map(name => [name, 1])) });
+    next.combinations = tablesIn(next.combinations?.filter?.((_, k) => !left.includes(k)));
+    const gone = lost.map(k => next.loads?.[k]).filter(isTable);
+    next.loads = tablesIn(next.loads);
+    for (const load of gone) removeLoad(next, load);
+    for (const [kind, key] of EDITED) setLoad(next, kind, elements[kind].value.trim(), key);
     if (!next.loads.length) { delete next.loads; delete next.combinations; }
   });
 }
 
+// Set the first load of a kind to a text, or remove it (""); a new one comes with its usual combination and the own weight.
+function setLoad(next, kind, text, key = "value") {
+  next.loads = tablesIn(next.loads);
+  next.combinations = tablesIn(next.combinations);
+  let load = next.loads.find(load => load.kind === kind);
+  if (!text) return load && removeLoad(next, load);
+  load ||= addUsual(next, kind);
+  load[key] = text;
+}
+
+function addUsual(next, kind) {
+  const free = (plain, rows) => { while (rows.some(({ name }) => name === plain)) plain += "_"; return plain; };
+  const { loads, combinations } = start.usual, usual = loads.find(load => load.kind === kind), load = { ...usual, name: free(usual.name, next.loads) };
+  if (![...next.loads, load].some(({ kind }) => kind === "self_weight")) addUsual(next, "self_weight");
+  next.loads.push(load);
+  const named = plain => (plain === usual.name ? load : next.loads.find(({ kind }) => kind === "self_weight")).name;
+  const { name, factors } = combinations.find(({ factors }) => Object.keys(factors).at(-1) === usual.name);
+  next.combinations.push({ name: free(name, next.combinations), factors: Object.fromEntries(Object.entries(factors).map(([plain, factor]) => [named(plain), factor])) });
+  return load;
+}
+
+// A combination that is left with the own weight alone, or with nothing, goes with the load, unless it is the last one.
+function removeLoad(next, load) {
+  next.loads = next.loads.filter(other => other !== load);
+  const heavy = name => next.loads.some(other => other.name === name && other.kind === "self_weight");
+  const touched = next.combinations.filter(({ factors }) => isTable(factors) && load.name in factors);
+  if (!next.loads.some(({ name }) => name === load.name)) for (const { factors } of touched) delete factors[load.name];
+  const idle = touched.filter(({ factors }) => Object.keys(factors).every(heavy)), rest = next.combinations.filter(table => !idle.includes(table));
+  next.combinations = rest.length ? rest : next.combinations.filter(({ factors }) => isTable(factors) && Object.keys(factors).length).slice(0, 1);
+  if (!next.combinations.length && next.loads.length) next.combinations.push({ name: "service", factors: Object.fromEntries(next.loads.map(({ name }) => [name, 1])) });
+}
+
+// For what a verdict holds, in words; "": for no load.
+const loadsOf = ({ loads }) => tablesIn(loads).map(({ kind, value }) => `${words(kind)?.replaceAll("_", " ")}${value === undefined ? "" : ` ${typeof value === "number" ? `${short(value / 1000)} kN/m2` : words(value)}`}`).join(", ");
+
 function wireTools() {
   byId("refine").onclick = () => change(next => set(next, "refine.vary", get(next, "refine.vary")?.length ? undefined : ["taper"]));
   byId("upright").onclick = () => {
-    pending = true;
     change(next => set(next, "target.up", yIsUp(next) ? "z" : "y"));
     buildControls();
   };
@@ -244,7 +290,6 @@ function hear(news) {
 // Another tab of this session has changed the case.
 function follow(news) {
   const changed = !same(news.case, base);
-  pending = pending || !same(news.case.target, base.target);
   outdate(changed, news.live);
   base = news.case;
   serial = news.serial;
@@ -257,12 +302,12 @@ function follow(news) {
 
 function see(bytes) {
   if (!drawn) return;
-  const first = !viewer.scene;
-  viewer.show(bytes, { keepView: !first });
-  if (pending) { viewer.home(); pending = false; }
+  const target = JSON.stringify(base.target ?? null);
+  viewer.show(bytes, { keepView: Boolean(viewer.scene) });
+  if (shown === serial && !dragging && fitted !== target) { viewer.home(); fitted = target; }
   placeHandles();
 }
-let pending = true;  // a new target: the view begins anew
+let fitted = "";  // the target that the view was fitted to: another one is, once it is let go
 
 function restore(state) {
   history = state;
@@ -273,7 +318,6 @@ function restore(state) {
   ready = restore.known = true;
   if (state.after === "step" ? same(from, base) : state.after !== "connect") return;
   const next = state.after === "connect" && edited ? base : (!known && restore.linked) || from || (known ? base : start.first);
-  pending = pending || !same(next.target, base.target);
   const changed = !known || !same(next, base);
   submit(clone(next), false);  // also an unchanged case: a server that was started again has not found its form yet
   if (!known && restore.linked === undefined) notice(NO_CASE);
@@ -300,7 +344,7 @@ function failed(sentence) {
   say("");
   const box = byId("verdict"), place = named(sentence);
   box.className = "failed";
-  box.replaceChildren(make("strong", { textContent: sentence }), ...remedies(sentence).map(([textContent, path, value]) => make("button", { type: "button", textContent, onclick: () => { pending = true; change(next => set(next, path, value)); buildControls(); } })));
+  box.replaceChildren(make("strong", { textContent: sentence }), ...remedies(sentence).map(([textContent, path, value]) => make("button", { type: "button", textContent, onclick: () => { change(next => set(next, path, value)); buildControls(); } })));
   byId("result").scrollTop = 0;
   if (place) box.append(make("button", { type: "button", textContent: `Go to ${place.name}`, onclick: place.show }));
   document.body.classList.toggle("old", shown !== serial);  // the shapes are those of a case before
@@ -334,8 +378,10 @@ function named(sentence) {
 }
 
 function goTo({ path }) {
+  search.value = "";
+  showFound();
   const fields = [...byId("controls").querySelectorAll(`[data-path="${path}"]`)], field = fields.at(-1);
-  gui.folders.find(({ _title }) => _title === `[${path.split(".")[0]}]`)?.open();
+  gui.folders.find(({ _title }) => _title === groupOf({ path }))?.open();
   field?.focus();
   field?.scrollIntoView({ block: "center" });
 }
@@ -347,15 +393,19 @@ function showFacts() {
   if (facts.verdict) {
     box.className = facts.verdict.level;
     const reasons = [...facts.verdict.reasons.slice(1), ...facts.facts];
-    box.replaceChildren(make("strong", { textContent: facts.verdict.headline }), make("ul", {}, ...reasons.map(text => make("li", { textContent: text }))));
-    const before = JSON.stringify(resolved);
+    const under = loadsOf(base);
+    box.replaceChildren(make("strong", { textContent: facts.verdict.headline }), make("p", { className: "under", textContent: under ? `Under ${under}` : "Unloaded: no snow and no wind are given" }), make("ul", {}, ...reasons.map(text => make("li", { textContent: text }))));
+    const chosen = () => JSON.stringify([resolved, figure("section"), figure("material")]), before = chosenBefore;
     resolved = facts.resolved;
-    if (before !== JSON.stringify(resolved)) refreshControls();
+    chosenBefore = chosen();
+    if (before !== chosenBefore) refreshControls();
     offer(shown === serial);
   } else if (facts.status !== "converged") box.replaceChildren(make("strong", { textContent: facts.status }));
   document.title = `${facts.name} · rodshell studio`;
   showPlan();
 }
+
+let chosenBefore = "";  // what the program chose, as the controls show it
 
 // Controls
 
@@ -363,8 +413,9 @@ let typing = false, stale = false;  // while somebody types or drags in a contro
 
 // The keys that the page has a field for: those of a case whose tables are of these kinds.
 function keysOfCase() {
-  const kinds = { target: base.target?.kind || "hemisphere", layout: base.layout?.kind || "chebyshev", "rod.section": base.rod?.section?.kind || "circle", joint: base.joint?.kind || "ball" };
-  return start.keys.filter(key => !key.reads_file && key.path !== "drape.frames" && (!key.kinds.length || key.kinds.includes(kinds[key.path.replace(/\.[^.]*$/, "")])));
+  const kinds = { target: base.target?.kind || "hemisphere", layout: base.layout?.kind || "chebyshev", "rod.section": base.rod?.section?.kind || "circle", joint: base.joint?.kind || "ball", bracing: base.bracing?.kind || "none", "bracing.section": base.bracing?.section?.kind || "circle" };
+  const braced = kinds.bracing !== "none";
+  return start.keys.filter(key => !key.reads_file && key.path !== "drape.frames" && (braced || !/^bracing\.(section|material)/.test(key.path)) && (!key.kinds.length || key.kinds.includes(kinds[key.path.replace(/\.[^.]*$/, "")])));
 }
 
 function buildControls() {
@@ -376,20 +427,108 @@ function buildControls() {
   gui = new GUI({ container: byId("controls"), injectStyles: false, title: file ? `Case of ${words(file).replace("upload:", "")}` : "Case" });
   const known = keysOfCase();
   const design = gui.addFolder("Design");
-  addKey(design, known.find(({ path }) => path === "layout.kind"), "Lattice");
+  addLattices(design);
   for (const [path, name, kind] of SLIDERS) {
     if (!known.some(key => key.path === path)) continue;
     addSlider(design, path, name, kind);
   }
+  addMaterial(design);
+  addSection(design);
+  for (const kind of Object.keys(MOST)) addLoad(design, kind);
+  addKey(design, known.find(({ path }) => path === "bracing.kind"), "Bracing", (next, kind) => { if (kind === "cables") Object.assign(next.bracing, clone(CABLES), /[\d.]+/.exec(figure("section"))?.[0] <= THIN ? { section: THIN_CABLE } : {}); });
   for (const [path, name] of FIRST) addKey(design, known.find(key => key.path === path), name);
-  const tables = [...new Set(known.filter(key => key.path.includes(".")).map(key => key.path.split(".")[0]))];
-  for (const table of tables) {
-    const folder = gui.addFolder(`[${table}]`);
-    for (const key of known.filter(({ path }) => path.startsWith(`${table}.`))) addKey(folder, key);
+  design.domElement.after(searching);
+  const inTables = known.filter(key => key.path.includes("."));
+  for (const table of new Set(inTables.map(tableOf))) {
+    const keys = inTables.filter(key => tableOf(key) === table), folder = gui.addFolder(groupOf(keys[0]));
+    for (const key of keys) addKey(folder, key);
     folder.close();
   }
   for (const folder of gui.foldersRecursive()) if (open.includes(folder._title)) folder.open();
+  if (search.value) showFound();
   if (focused) byId("controls").querySelector(`[data-path="${focused}"]`)?.focus();
+}
+
+// Settings whose name, group, key or help has all words that are searched for; without words all, in closed groups.
+const search = make("input", { type: "search", placeholder: "Search all settings", ariaLabel: "Search all settings", oninput: () => showFound() });
+const nothing = make("p", { textContent: "No setting has these words.", hidden: true });
+const searching = make("div", { className: "search" }, search, nothing);
+search.dataset.path = "search";
+
+function showFound() {
+  const wanted = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+  let count = 0;
+  for (const folder of gui.folders.slice(1)) {
+    const found = folder.controllers.filter(controller => {
+      const hit = wanted.every(word => `${folder._title} ${controller._name} ${controller.domElement.title}`.toLowerCase().includes(word));
+      controller.show(hit);
+      return hit;
+    });
+    count += found.length;
+    folder.show(found.length > 0);
+    folder.open(wanted.length > 0 && found.length > 0);
+  }
+  nothing.hidden = count > 0;
+}
+
+// Lattices as pictures; the one whose rods are given is shown only where a case has it.
+function addLattices(folder) {
+  const now = base.layout?.kind || "chebyshev", families = get(base, "layout.families") ?? 2;
+  folder.$children.prepend(make("div", { className: "lattices", role: "group", ariaLabel: "Lattice" }, ...LATTICES.filter(([kind]) => kind !== "curves" || kind === now).map(([kind, count, name, rods, angles, title]) => {
+    const picture = drawn2d("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, ...angles.map((angle, k) => drawn2d("path", { d: rods, transform: `rotate(${angle} 12 12)`, class: "uvw"[k] })));
+    const button = make("button", { type: "button", ariaPressed: String(kind === now && (kind !== "geodesic" || count === families)), title, onclick: () => {
+      change(next => {
+        forget(next, "layout.kind", kind);
+        set(next, "layout.kind", kind);
+        set(next, "layout.families", count === 3 ? count : undefined);
+      });
+      setTimeout(buildControls);
+    } }, picture, make("span", { textContent: name }));
+    button.dataset.path = `${kind} ${count}`;
+    return button;
+  })));
+}
+
+const figure = name => (resolved ? facts?.figures.find(([one]) => one === name)?.[1] : undefined);  // of this target
+const materialOf = () => get(base, "rod.material.preset") || (isTable(base.rod?.material) ? "" : figure("material")) || "";
+
+// Another material brings its own sections: one that it is not sold in is left to be chosen.
+function addMaterial(folder) {
+  addKey(folder, start.keys.find(({ path }) => path === "rod.material.preset"), "Material", (next, preset) => {
+    const sold = start.sold[preset] || [];
+    if (sold.length && !sold.includes(sectionGiven())) set(next, "rod.section", undefined);
+  });
+}
+
+// The section that the case gives, as the trade calls it; "": it is chosen to fit.
+function sectionGiven() {
+  const given = get(base, "rod.section"), sizes = isTable(given) ? Object.entries(given).filter(([name]) => name !== "kind") : [];
+  if (typeof given === "string") return (start.sold[materialOf()] || []).includes(given) ? given : figure("section") || given;
+  return sizes.length && !sizes.some(([, size]) => size === "auto") ? figure("section") || "as given" : "";
+}
+
+function addSection(folder) {
+  const given = sectionGiven(), sizes = new Set([...(start.sold[materialOf()] || []), ...(given ? [given] : [])]), fit = !given && figure("section");
+  const holder = { value: given }, choices = { [fit ? `fits: ${fit}` : "chosen to fit"]: "", ...Object.fromEntries([...sizes].map(size => [size, size])) };
+  const controller = folder.add(holder, "value", choices).name("Section");
+  controller.onFinishChange(() => change(next => set(next, "rod.section", holder.value)));
+  describe(controller, "rod.section", "sections in which the material is sold; any other one: in words, below");
+}
+
+// Snow and wind: the first load of its kind, which comes with its usual combination where the case has none.
+function addLoad(folder, kind) {
+  const found = tablesIn(base.loads).filter(load => load.kind === kind), unread = base.loads !== undefined && !Array.isArray(base.loads);
+  const given = found[0]?.value, text = /^\s*([\d.]+)\s*(kN\/m2|kPa)\s*$/.exec(given)?.[1], pascals = tablesIn(resolved?.loads).find(load => load.kind === kind)?.value;
+  const now = !found.length ? 0 : text ? Number(text) : (typeof given === "number" ? given : pascals) / 1000;
+  if (unread || found.length > 1 || !Number.isFinite(now)) return;  // the dialog has them
+  const holder = { value: now };
+  const controller = folder.add(holder, "value", 0, Math.max(MOST[kind], 2 * now), 0.05).name(`${kind === "snow" ? "Snow" : "Wind"} [kN/m2]`);
+  controller.onFinishChange(() => change(next => {
+    setLoad(next, kind, holder.value ? `${holder.value} kN/m2` : "");
+    const [own, ...others] = next.loads;
+    if (!own || (!others.length && own.kind === "self_weight" && !own.cladding)) { delete next.loads; delete next.combinations; }
+  }));
+  describe(controller, `loads.${kind}`, kind === "snow" ? "snow on the plan; with 1.35 times the own weight and 1.5 times the snow" : "velocity pressure of the wind, from four sides; with the own weight and 1.5 times the wind");
 }
 
 function value(path) {
@@ -404,17 +543,14 @@ function addSlider(folder, path, name, kind) {
   const now = value(path);
   if (!Number.isFinite(now)) return;
   const turned = kind === "angle" || kind === "crossing";
-  const small = !turned && (facts?.handles?.size || resolved?.target?.radius || now) < 1;
-  const unit = turned ? 180 / Math.PI : kind === "factor" ? 1 : small ? 1000 : 1;
+  const [symbol, unit] = unitOf(start.keys.find(key => key.path === path));
   const size = (facts?.handles?.size || 1) * unit;
   const [low, high] = range(path, now * unit, kind === "angle" ? [-90, 90] : kind === "crossing" ? [30, 150] : kind === "place" ? [now * unit - 0.5 * size, now * unit + 0.5 * size] : [now * unit / 2, now * unit * 2]);
   const given = typeof get(base, path) === "number" ? now * unit : Number((now * unit).toPrecision(4));
   const holder = { value: given };
-  const symbol = turned ? "\u00b0" : kind === "factor" ? "" : small ? "mm" : "m";
   const step = turned ? 0.5 : 10 ** Math.floor(Math.log10((high - low) / 400));
   const put = (live) => change(next => {
     set(next, path, turned ? holder.value / unit : Number((holder.value / unit).toPrecision(8)));
-    if (path.startsWith("target.")) pending = !live;
   }, live);
   const controller = folder.add(holder, "value", low, high, step).name(symbol ? `${name} [${symbol}]` : name);
   controller.onChange(() => put(true)).onFinishChange(() => put(false));
@@ -430,27 +566,38 @@ function range(path, now, wanted) {
   return ranges.get(path);
 }
 
-function addKey(folder, key, label = "") {
+// A value of a key as the page shows it, its numbers in the page's units; and what is given when such a text is typed.
+function shownValue(value, key) {
+  const factor = unitOf(key)[1], scaled = number => (typeof number === "number" ? Number((factor * number).toPrecision(10)) : number);
+  return typeof value === "string" ? value : factor !== 1 && Array.isArray(value) && !value.some(Array.isArray) ? value.map(scaled).join(", ") : JSON.stringify(scaled(value));
+}
+
+function typedValue(text, key) {
+  const factor = unitOf(key)[1], numbers = text.replace(/^\s*\[|\]\s*$/g, "").split(",").map(part => (part.trim() ? Number((Number(part) / factor).toPrecision(10)) : NaN));
+  if (factor !== 1 && numbers.every(Number.isFinite)) return numbers.length > 1 ? numbers : numbers[0];
+  try { return JSON.parse(text); } catch { return text; }
+}
+
+function addKey(folder, key, label = "", also = () => {}) {
   if (!key) return;
-  const raw = get(base, key.path);
-  const text = raw === undefined || isTable(raw) ? "" : typeof raw === "string" ? raw : JSON.stringify(raw);
+  const raw = get(base, key.path), symbol = unitOf(key)[0];
+  const text = raw === undefined || isTable(raw) ? "" : shownValue(raw, key);
   const holder = { value: text };
-  const name = label || key.path.split(".").slice(1).join(".");
+  const name = label || (symbol ? `${nameOf(key)} [${symbol}]` : nameOf(key));
   const given = get(resolved, key.path), shownAs = Array.isArray(given) ? given.join(", ") : String(given ?? "default");
-  const choices = { [`default: ${shownAs}`]: "", ...Object.fromEntries(key.choices.map(word => [word, String(word)])) };
+  const choices = { [given === undefined ? "default" : `default: ${shownAs}`]: "", ...Object.fromEntries(key.choices.map(word => [word, String(word)])) };
   const controller = key.choices.length && !key.any_value ? folder.add(holder, "value", choices) : folder.add(holder, "value");
   controller.name(name);
-  const asGiven = () => { try { return JSON.parse(holder.value); } catch { return holder.value; } };
   controller.onFinishChange(() => {
     change(next => {
       if (key.path.endsWith(".kind") || key.path === "rod.material.preset") forget(next, key.path, holder.value);
-      set(next, key.path, holder.value === "" ? undefined : asGiven());
-      if (key.path.startsWith("target.")) pending = true;
+      set(next, key.path, holder.value === "" ? undefined : typedValue(holder.value, key));
+      also(next, holder.value);
     });
     if (key.path.endsWith("kind")) setTimeout(buildControls);
   });
   const input = controller.domElement.querySelector("input");
-  if (input && given !== undefined) input.placeholder = isTable(given) ? "such as tube 32x3" : typeof given === "number" ? String(Number(given.toPrecision(6))) : String(given);
+  if (input && given !== undefined && given !== null) input.placeholder = isTable(given) ? "such as tube 32x3" : typeof given === "number" ? shownValue(Number(given.toPrecision(6)), key) : shownValue(given, key);
   describe(controller, key.path, key.help);
 }
 
@@ -482,21 +629,23 @@ function settled() {
 
 // The flat plan
 
+function drawn2d(name, attributes, ...children) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, text] of Object.entries(attributes)) element.setAttribute(key, text);
+  element.append(...children);
+  return element;
+}
+
 function showPlan() {
   const svg = byId("plan").querySelector("svg"), rods = facts.plan;
-  if (!rods.length) return svg.replaceChildren();
-  const draw = (name, attributes) => {
-    const element = document.createElementNS("http://www.w3.org/2000/svg", name);
-    for (const [key, text] of Object.entries(attributes)) element.setAttribute(key, text);
-    return element;
-  };
+  svg.toggleAttribute("hidden", !rods.length);
   const xs = rods.flatMap(({ ends }) => [ends[0], ends[2]]), ys = rods.flatMap(({ ends }) => [-ends[1], -ends[3]]);
   const [left, top] = [Math.min(...xs), Math.min(...ys)], wide = Math.max(...xs) - left, tall = Math.max(...ys) - top;
-  svg.setAttribute("viewBox", `${left - 0.03 * wide} ${top - 0.03 * tall} ${1.06 * wide || 1} ${1.06 * tall || 1}`);
+  if (rods.length) svg.setAttribute("viewBox", `${left - 0.03 * wide} ${top - 0.03 * tall} ${1.06 * wide || 1} ${1.06 * tall || 1}`);
   svg.replaceChildren(...rods.flatMap(({ id, family, ends }) => {
     const at = { x1: ends[0], y1: -ends[1], x2: ends[2], y2: -ends[3] };
-    const hit = draw("line", { ...at, class: "hit", tabindex: -1, "data-rod": id, "vector-effect": "non-scaling-stroke" });
-    return [draw("line", { ...at, class: family, "data-line": id }), hit];
+    const hit = drawn2d("line", { ...at, class: "hit", tabindex: -1, "data-rod": id, "vector-effect": "non-scaling-stroke" });
+    return [drawn2d("line", { ...at, class: family, "data-line": id }), hit];
   }));
   const gone = leftOut();
   byId("left-out").replaceChildren(...(gone.length ? ["Left out: ", ...gone.map(id => make("button", { type: "button", textContent: `${id} \u00d7`, ariaLabel: `Put rod ${id} back`, onclick: () => toggle(id) }))] : []));
@@ -520,8 +669,7 @@ function markRod(id) {
   marked = id;
   for (const line of byId("plan").querySelectorAll("line[data-line]")) line.classList.toggle("marked", line.dataset.line === id);
   const rod = facts?.plan.find(one => one.id === id);
-  const size = rod && (rod.length < 10 ? `${(1000 * rod.length).toFixed(1)} mm` : `${rod.length.toFixed(4)} m`);
-  byId("plan").querySelector("figcaption").textContent = rod ? `${id}: cut length ${size}. Click to leave it out.` : "Point at a rod; a click leaves it out.";
+  byId("plan").querySelector("figcaption").textContent = rod ? `${id}: cut length ${(1000 * rod.length).toFixed(1)} mm. Click to leave it out.` : facts?.plan.length === 0 ? "These rods do not lie flat as one grid: each is cut by itself, as in the download." : "Point at a rod; a click leaves it out.";
 }
 
 // Handles in the scene: a dot for the anchor, a ring with a knob for the heading, a cone each way for the base plane
@@ -670,7 +818,7 @@ function showVariants() {
   byId("variants").querySelector("ul").replaceChildren(...history.variants.map(({ name, verdict, case: kept }) => make("li", {},
     make("input", { type: "checkbox", name: "variant", value: name, checked: checked.includes(name), ariaLabel: `Compare ${name}`, onchange: compared }),
     make("span", { textContent: name, className: verdict.level, title: verdict.headline }),
-    make("button", { type: "button", textContent: "Open", ariaLabel: `Open ${name}`, onclick: () => { pending = true; submit(clone(kept), false); buildControls(); } }),
+    make("button", { type: "button", textContent: "Open", ariaLabel: `Open ${name}`, onclick: () => { submit(clone(kept), false); buildControls(); } }),
     make("button", { type: "button", textContent: "\u00d7", ariaLabel: `Forget ${name}`, onclick: () => order({ kind: "drop", name }) }))));
   compared();
 }
@@ -705,12 +853,15 @@ async function compare() {
     other.redraw();
     leading = null;
   }));
-  const rows = [["verdict", ...pair.map(({ verdict }) => verdict.headline)]], names = [...new Set(pair.flatMap(({ figures }) => figures.map(([name]) => name)))];
+  const rows = [["verdict", ...pair.map(({ verdict }) => verdict.headline)], ["loads", ...pair.map(kept => loadsOf(kept.case) || "unloaded")]], names = [...new Set(pair.flatMap(({ figures }) => figures.map(([name]) => name)))];
   for (const name of names) rows.push([name, ...pair.map(({ figures }) => figures.find(([one]) => one === name)?.[1] ?? "\u2013")]);
-  for (const { path } of start.keys) {
-    const [a, b] = pair.map(({ case: kept }) => JSON.stringify(get(kept, path)));
-    if (a !== b) rows.push([path, a ?? "default", b ?? "default"]);
+  for (const key of start.keys) {
+    if (/^(loads|combinations|rod\.section|rod\.material)/.test(key.path)) continue;  // are among the figures
+    const symbol = unitOf(key)[0], [a, b] = pair.map(({ case: kept }) => get(kept, key.path));
+    const said = value => (value === undefined ? "default" : `${shownValue(value, key)}${symbol && typeof value !== "string" ? ` ${symbol}` : ""}`);
+    if (!same(a, b)) rows.push([`${groupOf(key)}: ${nameOf(key)}`, said(a), said(b)]);
   }
+  rows.sort(([, a, b], [, c, d]) => (a === b) - (c === d));  // what differs comes first
   dialog.querySelector("tbody").replaceChildren(...rows.map(([name, a, b]) => make("tr", {}, make("th", { textContent: name, scope: "row" }), ...[a, b].map(text => make("td", { textContent: text, className: a === b ? "" : "differs" })))));
   dialog.addEventListener("close", () => views.forEach(view => view.dispose()), { once: true });
 }
@@ -747,7 +898,6 @@ async function openLink() {
   if (!restore.known) restore.linked = found;
   else if (found === undefined) notice(NO_CASE);
   else if (found) {
-    pending = true;
     submit(found, false);
     buildControls();
   }
@@ -776,8 +926,7 @@ async function upload(file, asOutline = false) {
   const said = await answer?.json().catch(() => undefined);
   if (!said) return say(`${file.name} was not sent, since the connection to rodshell studio failed: choose it again`, true);
   if (!answer.ok) return say(said.sentence, true);
-  pending = true;
-  if (get(base, outline ? "target.boundary" : "target.file") === said.file) { submit(clone(base), false); outdate(true, false); }  // a new state of the same file
+  if (get(base, outline ? "target.boundary" : "target.file") === said.file) { fitted = ""; submit(clone(base), false); outdate(true, false); }  // a new state of the same file
   else if (outline) change(next => set(next, "target.boundary", said.file));
   else submit({ target: { kind: start.surfaces[suffix], file: said.file } }, false);
   buildControls();
@@ -789,7 +938,6 @@ function wire() {
   byId("preset").replaceChildren(make("option", { value: "", textContent: "a built-in case" }), ...Object.keys(start.presets).map(name => make("option", { value: name, textContent: name })));
   byId("preset").onchange = ({ target }) => {
     if (!target.value) return;
-    pending = true;
     submit(clone(start.presets[target.value]), false);
     target.value = "";
     buildControls();

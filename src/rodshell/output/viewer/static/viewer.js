@@ -39,11 +39,12 @@ export function createViewer(root, { controls = true } = {}) {
   const caption = make("output", { className: "caption", ariaLive: "polite" });
   const choice = make("select", { className: "colours" });
   const bar = make("div", { className: "bar" }, make("span", { className: "what" }), make("div", { className: "map" }), make("div", { className: "ticks" }));
+  const families = make("div", { className: "families", ariaLabel: "Families of rods" });
   const boxes = Object.fromEntries(LAYERS.map(([name, , on]) => [name, make("input", { type: "checkbox", checked: on, className: name })]));
   const reset = make("button", { type: "button", textContent: "Reset view" });
   const picked = make("div", { className: "picked", ariaLive: "polite" });
   const panel = make("div", { className: "controls" },
-    make("label", {}, "Stage ", slider), play, reset, caption, make("label", {}, "Colour ", choice), bar,
+    make("label", {}, "Stage ", slider), play, reset, caption, make("label", {}, "Colour ", choice), bar, families,
     ...LAYERS.map(([name, text]) => make("label", { className: `layer ${name}` }, boxes[name], ` ${text}`)));
   panel.hidden = !controls;
   root.replaceChildren(make("div", { className: "stage" }, canvas, label), panel, picked);
@@ -80,8 +81,9 @@ export function createViewer(root, { controls = true } = {}) {
   function later() { if (!waiting) { waiting = true; requestAnimationFrame(draw); } }
 
   function show(bytes, { keepView = false } = {}) {
-    const before = scene && stage().name;
+    const before = scene && stage().name, last = scene;
     scene = readScene(bytes);
+    if (last && keepView) follow(last);
     scene.points = scene.stages.map(({ points }) => Float32Array.from(scene.array(points), (value, k) => value / 65535 - scene.box[k % 3] / 2));
     scene.normals = scene.stages.map(({ normals }) => normals && scene.array(normals));
     scene.first = [];
@@ -109,6 +111,15 @@ export function createViewer(root, { controls = true } = {}) {
     build();
     if (!keepView) home();
     later();
+  }
+
+  // The same view of the same place where another scene has another frame.
+  function follow({ size, low, box }) {
+    for (const place of [camera.position, orbit.target]) {
+      place.set(...place.toArray().map((value, k) => ((value + box[k] / 2) * size + low[k] - scene.low[k]) / scene.size - scene.box[k] / 2));
+    }
+    for (const end of ["minDistance", "maxDistance"]) orbit[end] *= size / scene.size;
+    orbit.update();
   }
 
   // The stage and the target fill the picture, seen from the south-east.
@@ -180,9 +191,9 @@ export function createViewer(root, { controls = true } = {}) {
   }
 
   // Colours (n, 3) of all entries, linear; by family where the stage has no values of this kind.
+  const seen = colour => linear(colour).map(value => value + (dark.matches ? 0.3 : 0) * (1 - value));
   function colours() {
     const scale = stage().colours[choice.value], count = scene.points[0].length / 3, result = new Float32Array(3 * count);
-    const lift = dark.matches ? 0.3 : 0, seen = colour => linear(colour).map(value => value + lift * (1 - value));
     if (scale) {
       const palette = scene.palettes[choice.value].map(seen), bins = scene.array(scale.bins), unknown = seen("#8a8f94");
       for (let k = 0; k < count; k++) result.set(palette[bins[k]] || unknown, 3 * k);
@@ -283,6 +294,13 @@ export function createViewer(root, { controls = true } = {}) {
     bar.style.visibility = scale ? "visible" : "hidden";
     caption.textContent = stage().caption;
     slider.setAttribute("aria-valuetext", stage().caption);
+    families.hidden = Boolean(scale) || !(scene.families?.length > 1);
+    bar.hidden = !families.hidden;
+    families.replaceChildren(...(scene.families || []).map(([name, ink]) => {
+      const swatch = make("i", {});
+      swatch.style.background = `#${new THREE.Color(...seen(ink)).getHexString()}`;
+      return make("span", {}, swatch, ` family ${name.toUpperCase()}`);
+    }));
     if (!scale) return;
     const step = 100 / palette.length, stops = palette.map((colour, k) => `${colour} ${k * step}% ${(k + 1) * step}%`);
     bar.querySelector(".map").style.background = `linear-gradient(90deg, ${stops})`;
