@@ -73,7 +73,7 @@ def job(name: str) -> rs.Job:
     })  # fmt: skip
 
 
-def carried(name: str) -> dict[str, tuple[float, float]]:
+def factors_of(name: str) -> dict[str, tuple[float, float]]:
     """By combination, how many times a shell carries it, and what it uses of its strength."""
     asked = job(name)
     loads = asked.case.built_loads()
@@ -93,7 +93,7 @@ def carried(name: str) -> dict[str, tuple[float, float]]:
 def main() -> None:
     names = sys.argv[1:] or ["garden pavilion"]
     for name in SHELLS if names == ["all"] else names:
-        shell, found = SHELLS[name], carried(name)
+        shell, found = SHELLS[name], factors_of(name)
         assert all(factor >= 1.5 and used <= 1 for factor, used in found.values()), f"{name}: {found}"
         said = ", ".join(f"{each} {factor:.2f} times, {100 * used:.0f} %" for each, (factor, used) in found.items())
         print(f"{name}, {shell.rod} at {shell.spacing}, {shell.ends}, {shell.snow}: {said}", flush=True)

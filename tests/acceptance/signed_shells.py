@@ -129,7 +129,7 @@ def example_rows() -> Iterator[Row]:
 def snow_rows() -> Iterator[Row]:
     """Shells of the gallery that are said to stand under snow, with imperfections and after years."""
     for name in under_snow.SHELLS:
-        found = under_snow.carried(name).values()
+        found = under_snow.factors_of(name).values()
         least, used = min(factor for factor, _ in found), max(used for _, used in found)
         yield Row(name, "limit short of the reserve of 1.5", max(0.0, 1.5 - least), 0, note=f"{least:.2f} times")
         yield Row(name, "use of the strength", used, 1)
