@@ -106,14 +106,22 @@ def test_bracing_is_the_distance_of_its_joints(tables: dict[str, list[dict[str, 
 
 
 def test_stock_holds_every_piece_of_every_rod(tables: dict[str, list[dict[str, str]]]) -> None:
+    """Row by row as many bars are cut as are numbered, each by the pieces in their order, and marked."""
     total: dict[str, float] = {}
+    last = 0
     for row in tables["stock"]:
-        used = 0.0
-        for word in row["pieces_mm"].split("; "):
-            name, length = word.split()
-            total[name.split(".")[0]] = total.get(name.split(".")[0], 0.0) + float(length)
-            used += float(length)
-        assert used + 3.0 * row["pieces_mm"].count(";") <= 400.0 + row["pieces_mm"].count(" ") * STEP
+        lengths, marks = [*map(float, row["pieces_mm"].split("; "))], row["marks"].split("; ")
+        numbers = [*map(int, row["bars"].split(" to "))]
+        assert numbers[0] == last + 1
+        last = numbers[-1]
+        assert last - numbers[0] + 1 == int(row["times"]) == len(marks)
+        for bar in marks:
+            for mark, length in zip(bar.split(" + "), lengths, strict=True):
+                total[mark.split(".")[0]] = total.get(mark.split(".")[0], 0.0) + length
+        assert (row["stock_mm"], row["saw_cut_mm"]) == ("400.0", "3.0")
+        used = sum(lengths) + 3.0 * len(lengths)
+        assert float(row["offcut_mm"]) == pytest.approx(max(400.0 - used, 0.0), abs=3 * STEP)
+    assert last == len(wished().results.plain()["fabrication"]["stock"]["bars"])
     assert total == pytest.approx({row["id"]: float(row["cut_length_mm"]) for row in tables["rods"]}, abs=3 * STEP)
 
 

@@ -155,10 +155,10 @@ def _tables(archive: Archive) -> Iterator[tuple[str, Table, str]]:
 
 
 def _plan_of(stock: Stock) -> str:
-    """How good a cutting plan is."""
+    """How good a cutting list is."""
     return (
-        f"First fit decreasing: {len(stock.bars)} bars, {percent(stock.waste)} waste. By the pieces' total "
-        f"length alone it takes {stock.fewest} bars; that is a lower bound, which may not be reachable."
+        f"{len(stock.bars)} bars, {percent(stock.waste)} waste, saw cuts included; however these pieces are cut, they "
+        f"take {stock.fewest} bars at least. Bars with the same pieces are in one row; each piece is marked rod.number."
     )
 
 

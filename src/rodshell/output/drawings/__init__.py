@@ -98,7 +98,7 @@ def _layouts(archive: Archive) -> dict[str, Layout]:
     extent = np.ptp(np.concatenate([plan.cuts.reshape(-1, 2), *plan.footprint]), axis=0)
     layouts = dict[str, Layout]()
     if lies_flat(archive):
-        layouts["plan"] = sheets.laid_out(partial(flat.flat_drawing, plan), extent, paper, plan.text, true_size=True)
+        layouts["plan"] = sheets.laid_out(partial(flat.flat_drawing, plan), extent, paper, plan.text)
     for name, (compose, extent) in _of_the_shell(archive).items():
         layouts[name] = sheets.laid_out(compose, extent, paper, FINER.get(name, 1.0) * plan.text)
     return layouts
