@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import zip_longest
 from math import ceil, isnan, log, pi
 
 import numpy as np
@@ -46,6 +47,7 @@ UNITS |= {unit: unit for unit in ("mm", "kg", "MPa", "N")}
 UNKNOWN = (np.nan, np.nan, np.nan)  # force
 FINE, OF_SHORTENING = 0.1, 20.0  # mm, of cables whose shortening is under so many steps of the other lengths
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
+NOT_SAID = "to be given"  # of what a workshop has to be told and rodshell does not decide
 Show = Callable[[float | None], str]
 
 
@@ -298,6 +300,22 @@ def foundations_table(archive: Archive) -> Table:
     return table
 
 
+def splices_table(archive: Archive) -> Table:
+    """One row a splice: where it is, between which joints, and the bending moment and the axial force, tension
+    positive, that it passes on in the final shape without loads, where the rod has one section."""
+    mm, rows = rounding_of(archive.results).mm, list[list[str]]()
+    for rod in rods_of(archive):
+        met, record = sorted(rod.joints, key=lambda joint: joint[1]), rod.record
+        passed = zip_longest(record.splices, record.splice_moments, record.splice_forces)
+        for k, (at, moment, force) in enumerate(passed, start=1):
+            before = [other for other, there in met if there < at][-1:]
+            after = [other for other, there in met if there > at][:1]
+            between = " and ".join(f"{rod.id}/{other}" for other in (*before, *after))
+            rows.append([f"{rod.id}.{k}", mm(rod.from_cut_end(at)), between, _six(moment), _six(force), NOT_SAID])
+    columns = ("after_piece", "from_cut_end_mm", "between_joints", "moment_Nm", "axial_force_N", "type")
+    return _in_columns(columns, rows)
+
+
 def stock_table(archive: Archive) -> Table:
     """One row for equal bars: their numbers, the lengths cut from each in their order, the offcut, and the marks of the
     pieces, bar by bar. A piece is named rod.number from the datum end, that of a lath on it rod-2.number."""
@@ -438,6 +456,10 @@ SCHEDULES = {
     "stock": Schedule(
         "Cutting list", stock_table,
         known=lambda archive: bool(archive.results.fabrication and archive.results.fabrication.stock),
+    ),
+    "splices": Schedule(
+        "Splices, moments and forces without loads", splices_table,
+        known=lambda archive: any(rod.splices for rod in archive.results.rods),
     ),
     "sections": Schedule(
         "Sections along the rods", sections_table,

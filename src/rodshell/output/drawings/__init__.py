@@ -50,7 +50,7 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
     if not _braced(archive):
         layouts.pop("bracing", None)
     checked = _checked(archive.results)
-    about = {"supports": _held(archive), "bracing": checked, "rods": checked}
+    about = {"supports": _held(archive), "bracing": checked, "rods": checked, "splices": checked}
 
     def listed(name: str) -> Iterator[Sheet]:
         schedule = SCHEDULES[name]
@@ -62,7 +62,7 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
         found += layout.sheets(paper)
         if name in SCHEDULES:
             found += listed(name)
-    for name in ("rods", "joints", "sections", "seams", "stock"):
+    for name in ("rods", "joints", "splices", "sections", "seams", "stock"):
         if SCHEDULES[name].known(archive):
             found += listed(name)
     return sheets.bound(found, sheets.title_block(archive, plan.summary), paper), paper

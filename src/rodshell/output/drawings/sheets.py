@@ -19,7 +19,7 @@ from rodshell.figures.form import Material, RodType
 from rodshell.figures.records import json_text
 from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
-from rodshell.output.grid import supported
+from rodshell.output.grid import holes_text, supported
 from rodshell.output.labels import Label, Room, closed_segments, nearby, segments, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
@@ -89,7 +89,7 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
         ("Revision", given.revision or "-"),
         ("Section", section_text(rod.section) or NOT_GIVEN),
         ("Material", _material(rod.material) or NOT_GIVEN),
-        ("Joints", _in_words(joint_rows(results.joint)) or "ball"),
+        ("Joints", ", ".join(filter(None, [_in_words(joint_rows(results.joint)) or "ball", holes_text(archive)]))),
         ("Supports", supported(final) if (final := archive.final or DRAPED) != DRAPED else "none, as draped"),
         ("Units", f"mm, shown to {rounding_of(results).words}"),
         ("Tolerance", NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
