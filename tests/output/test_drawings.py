@@ -21,7 +21,14 @@ from rodshell.output.drawing import Path as Line
 from rodshell.output.drawings import FINER, drawing_set, sheet_set
 from rodshell.output.drawings.flat import flat_drawing, flat_plan, strips_drawing
 from rodshell.output.drawings.sheets import OVERLAP, SCALES, bound, laid_out, room, tiled, title_block
-from rodshell.output.drawings.shell import SAME, bracing_drawing, elevations_drawing, erection_drawing, rod_curves
+from rodshell.output.drawings.shell import (
+    SAME,
+    bracing_drawing,
+    elevations_drawing,
+    erection_drawing,
+    rod_curves,
+    supports_drawing,
+)
 from rodshell.output.files import export
 from rodshell.output.grid import GridRod, joint_places, rods_of
 from rodshell.output.labels import spread
@@ -326,6 +333,31 @@ def test_elevations_give_dimensions_as_they_are_known(name: str, spans: tuple[st
     assert texts[3] == spans[1]
     longer = {**made.states, made.final: made.states[made.final or ""] * 1.0002}
     assert elevations_drawing(replace(made, states=longer), plan.text).texts[0].text != spans[0]
+
+
+def at_joint(drawing: Drawing, place: np.ndarray) -> str:
+    """The level that stands to the upper right of a place, or ""."""
+    corners = [(text.text, text.box()[0] - place) for text in drawing.texts if text.text[0] in "+-"]
+    return next((text for text, off in corners if np.all((off >= 0) & (off < 0.5 * drawing.text))), "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "share"), [("pavilion", 0.9), ("roof", 0.8)])
+def test_joints_and_rod_ends_have_their_levels_above_the_lowest_rod_end(name: str, share: float) -> None:
+    made = named(name)
+    shape, rounding = made.states[made.final or ""], rounding_of(made.results)
+    drawing = supports_drawing(made, flat_plan(made).text)
+    ends = shape[np.array([rod.nodes[[0, -1]] for rod in rods_of(made)]).ravel(), 2]
+    places = joint_places(made, shape)
+    levels = {joint: at_joint(drawing, 1e3 * place[:2]) for joint, place in places.items()}
+    for joint, level in levels.items():
+        if level:
+            assert float(level) == pytest.approx(1e3 * (places[joint][2] - ends.min()), abs=0.501 * rounding.step)
+    assert np.mean([bool(level) for level in levels.values()]) > share
+    raised = [text.text for text in elevations_drawing(made, 10.0).texts if text.text[0] in "+\N{PLUS-MINUS SIGN}"]
+    tops = {*(round(1e3 * (z - ends.min())) for z in (ends.min(), ends.max(), shape[:, 2].max()))}
+    assert sorted({round(float(level.strip("\N{PLUS-MINUS SIGN}"))) for level in raised}) == sorted(tops)
+    assert len(raised) == 2 * len(tops)
 
 
 @pytest.mark.slow
