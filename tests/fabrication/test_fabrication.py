@@ -2,15 +2,19 @@
 
 from dataclasses import replace
 from itertools import combinations, pairwise
+from math import ceil
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
 import rodshell as rs
-from rodshell.fabrication.cutting import nest, splices
+from rodshell.arrays import Floats
+from rodshell.fabrication.cutting import splices
 from rodshell.fabrication.fabricate import Fabricated, fabricate
+from rodshell.fabrication.nesting import nest
 from rodshell.fabrication.settings import Fabrication
 from rodshell.figures.fabrication import Piece
 from rodshell.layout import FlatGrid, Profile, mesh_grid, straight_rods
@@ -79,7 +83,44 @@ def test_every_piece_is_cut_once_and_no_bar_is_too_short(pieces: list[int], kerf
     assert plan.waste == pytest.approx(1 - sum(lengths) / (stock * len(plan.bars)))
     if kerf == 0:
         best = fewest_bars(lengths, stock)
-        assert plan.fewest <= best <= len(plan.bars) <= 11 / 9 * best + 2 / 3  # [Dosa 2007]
+        assert plan.fewest <= best <= len(plan.bars) <= best + 1
+
+
+def shares_of_bars(lengths: Floats, wanted: Floats, room: float) -> float:
+    """The fewest bars where shares of bars are allowed, by the linear program of all patterns."""
+    patterns = [()]
+    for length in lengths:
+        patterns = [
+            (*some, n) for some in patterns for n in range(1 + int((room - lengths[: len(some)] @ some) // length))
+        ]
+    columns = np.array(patterns, dtype=float)
+    return float(linprog(np.ones(len(columns)), A_ub=-columns.T, b_ub=-wanted).fun)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_plan_takes_at_most_one_bar_more_than_the_linear_program_of_all_patterns(seed: int) -> None:
+    """Of these lists first fit decreasing takes up to 5 bars more than the best."""
+    random = np.random.default_rng(seed)
+    kinds, stock, kerf = np.unique(random.integers(1200, 3000, size=9)) / 1000, 6.0, 0.004
+    wanted = random.integers(1, 12, size=len(kinds))
+    plan = nest(named(np.repeat(kinds, wanted).tolist()), stock, kerf=kerf)
+    bound = ceil(shares_of_bars(kinds + kerf, wanted, stock + kerf + 1e-9) - 1e-6)
+    assert plan.fewest <= bound <= len(plan.bars) <= bound + 1
+
+
+def test_pieces_of_a_third_and_more_are_mated_as_first_fit_decreasing_fails_to() -> None:
+    """Ten bars of 0.51, 0.27, 0.22 and five of 0.26, 0.26, 0.48: the longest first, they take more."""
+    lengths = [0.51] * 10 + [0.27] * 10 + [0.22] * 10 + [0.26] * 10 + [0.48] * 5
+    plan = nest(named(lengths), 1.0)
+    assert len(plan.bars) == plan.fewest == 15
+
+
+def test_of_hundreds_of_pieces_the_plan_is_within_one_bar_of_its_bound() -> None:
+    random = np.random.default_rng(4)
+    lengths = np.repeat(random.uniform(0.2, 0.5, 50), 3).round(4).tolist()
+    plan = nest(named(lengths), 1.0, kerf=0.0005)
+    assert plan.fewest <= len(plan.bars) <= plan.fewest + 1
+    assert plan.fewest >= sum(lengths)
 
 
 def test_pieces_that_fill_a_bar_to_the_last_leave_nothing() -> None:

@@ -84,7 +84,13 @@ def found(name: str) -> Archive:
 
 @cache
 def formed(name: str) -> Archive:
-    """One of `TARGETS`, or one of those that are kept, see `found`."""
+    """One of `TARGETS`, one of those that are kept, see `found`, the "pavilion" or a dome of three "families"."""
+    if name == "pavilion":
+        return rs.Job.load("pavilion", fabrication__stock_length="6 m").run().archive()
+    if name == "families":
+        lath = rs.Rod(rs.RectangularSection(width=0.002, height=0.020), rs.Material.preset("gfrp"))
+        layout = rs.Geodesic(spacing=0.3, families=3)
+        return rs.find_form(rs.Cap(radius=2.0, base=1.0), layout, lath, joint=rs.Pin(), ends="pinned").archive()
     return archive(name) if name in TARGETS else read(KEPT / name)
 
 

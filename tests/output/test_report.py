@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,23 +10,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pypdfium2 import PdfDocument
 
 import rodshell as rs
 from rodshell.checks.deployment import Deployment
 from rodshell.figures.checks import Bending, WorstBent
 from rodshell.figures.form import Layout, Material, Target
 from rodshell.output.colour_scale import ABOVE
+from rodshell.output.drawings import drawing_set
 from rodshell.output.drawings.flat import flat_plan
 from rodshell.output.files import export
-from rodshell.output.report import checks_table, key_figures, size_text
+from rodshell.output.grid import caption_of
+from rodshell.output.report import IN_PAGE, checks_table, key_figures, size_text
 from rodshell.output.viewer import Scene, scene_of
 from rodshell.results import Archive, Results, wording
 from rodshell.results.archive import shown_case
 from rodshell.results.facts import facts
 from rodshell.results.from_form import rod_type
+from rodshell.results.states import shells_among
 from rodshell.results.wording import Rounding
 from tests.acceptance.cases import ROD
-from tests.output.browser import SCALE, coloured, needs_browser, open_report, wrong_legends
+from tests.output.browser import CHROMIUM, SCALE, coloured, needs_browser, open_report, wrong_legends
 from tests.output.forms import TARGETS, archive, breaking, wished
 from tests.output.sample_archive import sample_archive, table_archive, with_deployment
 
@@ -84,6 +89,31 @@ def test_in_a_browser_the_slider_moves_the_table_sorts_and_the_console_is_silent
     assert lengths == sorted(lengths)
     assert [float(value) for value in found["down"]] == lengths[::-1]
     assert len(set(lengths)) > 2
+
+
+@pytest.mark.slow
+@needs_browser
+def test_printed_each_shape_and_each_drawing_has_a_page_with_its_name(tmp_path: Path) -> None:
+    made = wished()
+    out = tmp_path / "report.pdf"
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer", "--virtual-time-budget=3000"]
+    page = page_of(made, tmp_path)
+    subprocess.run([str(CHROMIUM), *flags, f"--print-to-pdf={out}", page.as_uri()], check=True, capture_output=True)
+    pages = [" ".join(sheet.get_textpage().get_text_range().split()) for sheet in PdfDocument(out)]
+    names = [caption_of(made, state) for state in ("flat", *shells_among(made.states))]
+    names += [drawing_set(made)[name].title for name in IN_PAGE]
+    heads = [page.removeprefix("The shell ").removeprefix("Other drawings ") for page in pages]
+    shown = [[name for name in names if head.startswith(name)] for head in heads]
+    assert sorted(name for some in shown for name in some) == sorted(names)
+    assert max(map(len, shown)) == 1
+
+
+def test_solver_s_figures_stand_in_an_appendix_at_the_end(tmp_path: Path) -> None:
+    before, _, appendix = page_of(wished(), tmp_path).read_text(encoding="utf-8").rpartition("<h2>Appendix")
+    assert appendix.count("<h2>") == 0
+    for word in ("Iterations", "Factorisations", "Force residual", "Degrees of freedom", "Levels of the drape"):
+        assert f">{word}<" in appendix
+        assert word.lower() not in re.sub("<style>.*?</style>|<script.*?</script>", "", before, flags=re.DOTALL).lower()
 
 
 BROKEN = """() => [...document.querySelectorAll("th, td, h1, h2, h3, strong")].flatMap(cell => {
@@ -266,7 +296,7 @@ def test_checks_are_in_words_and_numbers(tmp_path: Path) -> None:
     assert f"{100 * share:.2g} %" in page
     assert "Sum of all forces over the largest" in page
     assert read(scene_of(made))[0]["kinds"]["stress"] == "utilisation"
-    assert re.search(r"<h2>Stock</h2>", page)
+    assert re.search(r"<h2>Cutting list</h2>", page)
     assert "cut = &#34;LASER&#34;" in page
 
 
@@ -450,7 +480,7 @@ def test_the_page_says_that_the_fewest_bars_are_a_bound(tmp_path: Path) -> None:
     stock = wished().results.plain()["fabrication"]["stock"]
     page = " ".join(page_of(wished(), tmp_path).read_text().split())
     assert f"{len(stock['bars'])} bars, " in page
-    assert f"total length alone it takes {stock['fewest']} bars; that is a lower bound" in page
+    assert f"however these pieces are cut, they take {stock['fewest']} bars at least" in page
 
 
 def test_a_grid_that_rests_on_its_target_tells_depth_and_not_gap() -> None:

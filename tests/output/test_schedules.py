@@ -106,15 +106,48 @@ def test_bracing_is_the_distance_of_its_joints(tables: dict[str, list[dict[str, 
 
 
 def test_stock_holds_every_piece_of_every_rod(tables: dict[str, list[dict[str, str]]]) -> None:
+    """Row by row as many bars are cut as are numbered, each by the pieces in their order, and marked."""
     total: dict[str, float] = {}
+    last = 0
     for row in tables["stock"]:
-        used = 0.0
-        for word in row["pieces_mm"].split("; "):
-            name, length = word.split()
-            total[name.split(".")[0]] = total.get(name.split(".")[0], 0.0) + float(length)
-            used += float(length)
-        assert used + 3.0 * row["pieces_mm"].count(";") <= 400.0 + row["pieces_mm"].count(" ") * STEP
+        lengths, marks = [*map(float, row["pieces_mm"].split("; "))], row["marks"].split("; ")
+        numbers = [*map(int, row["bars"].split(" to "))]
+        assert numbers[0] == last + 1
+        last = numbers[-1]
+        assert last - numbers[0] + 1 == int(row["times"]) == len(marks)
+        for bar in marks:
+            for mark, length in zip(bar.split(" + "), lengths, strict=True):
+                total[mark.split(".")[0]] = total.get(mark.split(".")[0], 0.0) + length
+        assert (row["stock_mm"], row["saw_cut_mm"]) == ("400.0", "3.0")
+        used = sum(lengths) + 3.0 * len(lengths)
+        assert float(row["offcut_mm"]) == pytest.approx(max(400.0 - used, 0.0), abs=3 * STEP)
+    assert last == len(wished().results.plain()["fabrication"]["stock"]["bars"])
     assert total == pytest.approx({row["id"]: float(row["cut_length_mm"]) for row in tables["rods"]}, abs=3 * STEP)
+
+
+def test_splices_pass_on_the_moment_and_the_force_of_the_rod_there(tables: dict[str, list[dict[str, str]]]) -> None:
+    """By the states of the final shape: EI times the curvature of the nodes on both sides, and the force in them."""
+    made = wished()
+    rods = {rod.id: (rod, start) for rod, start in zip(made.results.rods, made.states["rod_start"], strict=True)}
+    assert len(tables["splices"]) == sum(len(rod.splices) for rod, _ in rods.values()) > 0
+    for row in tables["splices"]:
+        name, _, number = row["after_piece"].partition(".")
+        rod, start = rods[name]
+        at = rod.splices[int(number) - 1]
+        assert float(row["from_cut_end_mm"]) == pytest.approx(1e3 * at + 12.0, abs=0.501 * STEP)
+        nodes = made.states["rod_nodes"][start:]
+        at_nodes = np.cumsum(np.linalg.norm(np.diff(made.states["flat"][nodes], axis=0), axis=1))
+        near = start + int(np.searchsorted(at_nodes, at))  # the last node before the splice
+        for column, state, share in (
+            ("moment_Nm", "curvature_clamped", made.results.rod.EI), ("axial_force_N", "force_clamped", 1.0)
+        ):  # fmt: skip
+            low, high = np.sort(share * made.states[state][near : near + 2])
+            assert low - 1e-5 * abs(low) <= float(row[column]) <= high + 1e-5 * abs(high)
+        before, after = (joint.split("/") for joint in row["between_joints"].split(" and "))
+        places = {joint.other: joint.at for joint in rod.joints}
+        assert before[0] == after[0] == name
+        assert places[before[1]] < at < places[after[1]]
+        assert row["type"] == "to be given"
 
 
 def test_end_paths_go_from_flat_to_the_supports(tables: dict[str, list[dict[str, str]]]) -> None:

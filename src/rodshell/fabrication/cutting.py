@@ -1,13 +1,9 @@
-"""Cutting rods from stock: where to splice a rod that is longer than a bar, and the pieces of each bar."""
-
-from collections.abc import Sequence
-from math import ceil
+"""Where to splice a rod that is longer than a bar of stock."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rodshell.arrays import Floats
-from rodshell.figures.fabrication import Bar, Piece, Stock
 
 TINY = 1e-9  # of a bar: round-off
 Route = tuple[int, int, float, tuple[float, ...]]  # to a stop: pieces, short ones of them, worst bend, stops before it
@@ -54,23 +50,3 @@ def _fewest(stops: Floats, bend: Floats, stock: float, short: float) -> list[flo
         reached += [(float(stops[k]), min(ways))] if ways else []
     last, (_, _, _, before) = reached[-1]
     return [*before[-2::-1]] if last == stops[-1] else None
-
-
-def nest(pieces: Sequence[Piece], stock: float, *, kerf: float = 0.0) -> Stock:
-    """Cut pieces from bars of the length `stock` [m], the longest first, each from the first bar that has room.
-
-    It takes at most 11/9 of the fewest bars that could do, and two thirds of one more [Dosa 2007]. Every piece but
-    one that uses a bar to its end costs one `kerf` [m]. No piece may be longer than a bar. Saw cuts count as waste.
-    """
-    content, left = list[list[Piece]](), list[float]()
-    for piece in sorted(pieces, key=lambda piece: -piece.length):
-        bar = next((k for k, rest in enumerate(left) if rest >= piece.length - TINY * stock), len(left))
-        if bar == len(left):
-            content.append([])
-            left.append(stock)
-        content[bar].append(piece)
-        left[bar] = max(left[bar] - piece.length - kerf, 0.0)
-    used = sum(piece.length for piece in pieces)
-    bars = tuple(Bar(pieces=tuple(inside), left=rest) for inside, rest in zip(content, left, strict=True))
-    waste = 1.0 - used / (stock * len(bars)) if bars else 0.0
-    return Stock(waste=waste, fewest=ceil(used / stock - TINY), bars=bars)

@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from rodshell.arrays import Floats, Ints
-from rodshell.fabrication.cutting import nest, splices
+from rodshell.fabrication.cutting import splices
+from rodshell.fabrication.nesting import nest
 from rodshell.fabrication.settings import Fabrication
 from rodshell.figures import fabrication as figures
 from rodshell.figures.fabrication import Brace, Piece

@@ -35,7 +35,7 @@ class Stock(Record):
     """The cutting plan."""
 
     waste: Number = key("share of the stock that is in no piece")
-    fewest: Whole | None = key("bars that the pieces' total length takes at least, whether or not they can be cut so")
+    fewest: Whole | None = key("bars that these pieces take at least, however they are cut")
     bars: Rows[Bar] = rows("the bars")
 
 

@@ -338,6 +338,8 @@ class Rod(Bent, RodLine):
     """One rod, with its worst bending in the final shape."""
 
     pop_up: Bent | None = key("worst bending in all shapes, those of the deployment included")
+    splice_moments: Rows[Real] = rows("bending moment at each splice in the final shape without loads", "N m")
+    splice_forces: Rows[Real] = rows("axial force at each splice there, tension positive", "N")
 
 
 class Dropped(Record):

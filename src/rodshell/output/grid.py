@@ -1,5 +1,6 @@
 """The grid of an archive: its rods and joints in the flat plan, its outlines, and its shapes from flat to popped up."""
 
+import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -268,6 +269,15 @@ def caption_of(archive: Archive, state: str) -> str:
     if archive.is_lost(state):
         return f"Not popped up, {state.removeprefix(POPPED)} ends: where the computation stopped"
     return CAPTIONS.get(state) or f"Popped up, {supported(state)}"
+
+
+def holes_text(archive: Archive) -> str:
+    """How large the holes at the joints are, in words; "" where rods cross by slots."""
+    made = archive.results.fabrication
+    if made is not None and made.slot_depth:
+        return ""
+    given = tomllib.loads(archive.case_toml).get("strength", {}).get("hole")
+    return f"holes {f'{1e3 * given:g} mm' if isinstance(given, float) else given or 'to be given'}"
 
 
 def supported(state: str, *more: str) -> str:

@@ -15,7 +15,7 @@ from rodshell.output.drawing import BELOW, LETTER, LINE, SMALL, Pencil, Text
 
 _Extent = tuple[float, float, float, float]
 
-LOWEST = np.radians(-75.0)  # angle of a text: readable from below or from the right, also when somewhat steeper
+NOISE = 1e-3  # rad: a text that leans no more than this beyond the vertical is vertical
 CLOSE = 5  # positions that are tried on a label's line
 STEPS, _TURNS = 40, np.pi / 8 * np.array([0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6, -6, 7, -7, 8])  # and next to it
 THIN = 0.1  # what a line takes, over the size of its text
@@ -235,10 +235,9 @@ def closed_segments(outline: Floats) -> Floats:
 
 
 def upright(angle: float) -> float:
-    """The angle [rad] of a text along a line, turned by pi where it would stand on its head."""
-    if LOWEST < angle <= LOWEST + np.pi:
-        return angle
-    return angle + (np.pi if angle < 0 else -np.pi)
+    """The angle [rad] of a text along a line, -pi/2 to pi/2: it reads from below, or from the right if vertical."""
+    lowest = NOISE - 0.5 * np.pi
+    return min(lowest + (angle - lowest) % np.pi, 0.5 * np.pi)
 
 
 # Callouts

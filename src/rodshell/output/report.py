@@ -84,6 +84,7 @@ def report_html(archive: Archive) -> str:
         one_scale=sum(map(is_shell, states)) > 1,
         loads=loads_page(archive),
         figures=key_figures(results, plan),
+        solved=solved_table(results),
         levels=levels_table(results),
         plan=shown(_on_page(files["plan"])) if "plan" in files else "",
         drawings=[(drawings[name].title, shown(_on_page(files[name]))) for name in IN_PAGE if name in drawings],
@@ -149,6 +150,7 @@ def _tables(archive: Archive) -> Iterator[tuple[str, Table, str]]:
         "joints": "Named by the rods that meet, a/b. Final: in the popped-up shell.",
         "supports": "With the reactions of the unloaded shell: schedule/supports.csv.",
         "seams": "Forces: the sum of both rods' support forces.",
+        "splices": "In the final shape; what loads add is not in it. The type of splice has to be given.",
         "stock": _plan_of(fabrication.stock) if fabrication and fabrication.stock else "",
     }
     for name, note in notes.items():
@@ -158,10 +160,10 @@ def _tables(archive: Archive) -> Iterator[tuple[str, Table, str]]:
 
 
 def _plan_of(stock: Stock) -> str:
-    """How good a cutting plan is."""
+    """How good a cutting list is."""
     return (
-        f"First fit decreasing: {len(stock.bars)} bars, {percent(stock.waste)} waste. By the pieces' total "
-        f"length alone it takes {stock.fewest} bars; that is a lower bound, which may not be reachable."
+        f"{len(stock.bars)} bars, {percent(stock.waste)} waste, saw cuts included; however these pieces are cut, they "
+        f"take {stock.fewest} bars at least. Bars with the same pieces are in one row; each piece is marked rod.number."
     )
 
 
@@ -184,10 +186,12 @@ _POP_UP: tuple[Entry, ...] = (
     ("Stable equilibrium, unloaded", "stable", wording.yes_or_no),
     ("Negative modes", "negative_modes", str),
     ("Largest strain", "max_strain", wording.small),
-    ("Force residual", "force_residual", wording.newtons),
+)
+_SOLVED: tuple[Entry, ...] = (
     ("Degrees of freedom", "dofs", str),
     ("Iterations", "iterations", str),
     ("Factorisations", "factorizations", str),
+    ("Force residual", "force_residual", wording.newtons),
     ("Time", "seconds", wording.seconds),
 )
 _NET: tuple[Entry, ...] = (
@@ -198,13 +202,10 @@ _NET: tuple[Entry, ...] = (
 _DRAPE: tuple[Entry, ...] = (
     ("method", "method", str),
     ("status", "status", str),
-    ("degrees of freedom", "dofs", str),
     ("largest gap", "max_gap", wording.millimetres),
     ("largest strain", "max_strain", wording.small),
-    ("force residual", "force_residual", wording.newtons),
     ("negative modes", "negative_modes", str),
     ("smallest angle between rods", "min_angle_deg", wording.degrees),
-    ("time", "seconds", wording.seconds),
 )
 _PRESET: tuple[Entry, ...] = (
     ("the preset's grade", "grade", str),
@@ -277,8 +278,7 @@ def refinement_table(results: Results) -> dict[str, Any] | None:
         ("Root mean square of the gap, over the target's size", "rms_relative", wording.percent),
         ("Largest gap, over the target's size", "max_relative", wording.percent),
     )
-    said = f"Varied: {', '.join(found.vary)}; {found.ends} ends; {found.factorizations} factorisations"
-    said += f", and {found.gate_factorizations} for the gates."
+    said = f"Varied: {', '.join(found.vary)}; {found.ends} ends."
     if found.refused:
         said += f" The best design was refused, {found.refused}."
     gates = [(GATE_WORDS[gate], wording.yes_or_no(passed)) for gate, passed in (found.gates or {}).items()]
@@ -340,6 +340,18 @@ def key_figures(results: Results, plan: FlatPlan) -> list[tuple[str, list[Row]]]
     return [(title, rows) for title, rows in groups if rows]
 
 
+def solved_table(results: Results) -> dict[str, Any] | None:
+    """What the equations of the drape and of each pop-up took: `columns` and `rows` of (title, values), and `said`."""
+    ends = finals_first(results.pop_up)
+    records = [results.drape or Drape(), *(results.pop_up[end] for end in ends)]
+    rows, found = _side_by_side(_SOLVED, records, rounding_of(results)), results.refinement
+    said = (
+        found and f"Refinement: {found.factorizations} factorisations, and {found.gate_factorizations} for the gates."
+    )
+    columns = ["drape", *(f"pop-up, {end}" for end in ends)]
+    return {"columns": columns, "rows": rows, "said": said} if rows else None
+
+
 def levels_table(results: Results) -> dict[str, Any] | None:
     """The drape's levels: `columns` and `rows` of whatever was recorded."""
     levels = [level.plain() for level in results.drape.levels] if results.drape else []
@@ -361,7 +373,7 @@ def _side_by_side(listed: tuple[Entry, ...], records: Sequence[Record], rounding
     """A row for each figure that is known of at least one record."""
     rows = Columns()
     for title, name, show in listed:
-        values = [getattr(record, name) for record in records]
+        values = [getattr(record, name, None) for record in records]
         if any(value is not None for value in values):
             rows.append((title, [_shown(show, value, rounding) for value in values]))
     return rows

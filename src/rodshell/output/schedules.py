@@ -11,13 +11,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import zip_longest
 from math import ceil, isnan, log, pi
 
 import numpy as np
 
 from rodshell.arrays import Floats
 from rodshell.figures.checks import JointLoad
-from rodshell.figures.fabrication import Stock
+from rodshell.figures.fabrication import Bar
 from rodshell.figures.form import Bent, Meeting, Stiffness
 from rodshell.figures.records import printable
 from rodshell.geometry.frames import unit
@@ -46,6 +47,7 @@ UNITS |= {unit: unit for unit in ("mm", "kg", "MPa", "N")}
 UNKNOWN = (np.nan, np.nan, np.nan)  # force
 FINE, OF_SHORTENING = 0.1, 20.0  # mm, of cables whose shortening is under so many steps of the other lengths
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
+NOT_SAID = "to be given"  # of what a workshop has to be told and rodshell does not decide
 Show = Callable[[float | None], str]
 
 
@@ -298,16 +300,37 @@ def foundations_table(archive: Archive) -> Table:
     return table
 
 
+def splices_table(archive: Archive) -> Table:
+    """One row a splice: where it is, between which joints, and the bending moment and the axial force, tension
+    positive, that it passes on in the final shape without loads, where the rod has one section."""
+    mm, rows = rounding_of(archive.results).mm, list[list[str]]()
+    for rod in rods_of(archive):
+        met, record = sorted(rod.joints, key=lambda joint: joint[1]), rod.record
+        passed = zip_longest(record.splices, record.splice_moments, record.splice_forces)
+        for k, (at, moment, force) in enumerate(passed, start=1):
+            before = [other for other, there in met if there < at][-1:]
+            after = [other for other, there in met if there > at][:1]
+            between = " and ".join(f"{rod.id}/{other}" for other in (*before, *after))
+            rows.append([f"{rod.id}.{k}", mm(rod.from_cut_end(at)), between, _six(moment), _six(force), NOT_SAID])
+    columns = ("after_piece", "from_cut_end_mm", "between_joints", "moment_Nm", "axial_force_N", "type")
+    return _in_columns(columns, rows)
+
+
 def stock_table(archive: Archive) -> Table:
-    """One row a bar of stock: its pieces, named rod.number from the datum end, those of a lath on it
-    rod-2.number, and what is left of it."""
-    stock, mm = _stock_of(archive), rounding_of(archive.results).mm
-    bars = stock.bars if stock else ()
-    return {
-        "bar": [str(k) for k in range(1, len(bars) + 1)],
-        "pieces_mm": ["; ".join(f"{piece.piece} {mm(piece.length)}" for piece in bar.pieces) for bar in bars],
-        "left_mm": [mm(bar.left) for bar in bars],
-    }
+    """One row for equal bars: their numbers, the lengths cut from each in their order, the offcut, and the marks of the
+    pieces, bar by bar. A piece is named rod.number from the datum end, that of a lath on it rod-2.number."""
+    made, mm, rows = archive.results.fabrication, rounding_of(archive.results).mm, list[list[str]]()
+    first, patterns = 1, dict[tuple[str, ...], list[Bar]]()
+    for bar in made.stock.bars if made and made.stock else ():
+        patterns.setdefault(tuple(mm(piece.length) for piece in bar.pieces), []).append(bar)
+    for lengths, bars in patterns.items():
+        last = first + len(bars) - 1
+        marks = (" + ".join(piece.piece for piece in bar.pieces) for bar in bars)
+        numbers = str(first) if first == last else f"{first} to {last}"
+        cut = (mm(made.stock_length), "; ".join(lengths), mm(made.kerf), mm(bars[0].left)) if made else ()
+        rows.append([numbers, str(len(bars)), *cut, "; ".join(marks)])
+        first = last + 1
+    return _in_columns(("bars", "times", "stock_mm", "pieces_mm", "saw_cut_mm", "offcut_mm", "marks"), rows)
 
 
 def end_paths_table(archive: Archive) -> Table:
@@ -418,10 +441,6 @@ class Schedule:
         return {name: cells for name, cells in self.table(archive).items() if shown(name, cells)}
 
 
-def _stock_of(archive: Archive) -> Stock | None:
-    return archive.results.fabrication.stock if archive.results.fabrication else None
-
-
 SCHEDULES = {
     "rods": Schedule(
         "Rods", rods_table, ("family", "offset_mm", "start_mm", "end_mm", "max_*_curvature_per_m", "max_twist_*",
@@ -434,7 +453,14 @@ SCHEDULES = {
         "Edge beams", edge_beams_table, ("of",), known=lambda archive: bool(archive.results.edge_beams)
     ),
     "foundations": Schedule("Foundations", foundations_table, known=lambda archive: bool(archive.results.loads)),
-    "stock": Schedule("Stock", stock_table, known=lambda archive: _stock_of(archive) is not None),
+    "stock": Schedule(
+        "Cutting list", stock_table,
+        known=lambda archive: bool(archive.results.fabrication and archive.results.fabrication.stock),
+    ),
+    "splices": Schedule(
+        "Splices, moments and forces without loads", splices_table,
+        known=lambda archive: any(rod.splices for rod in archive.results.rods),
+    ),
     "sections": Schedule(
         "Sections along the rods", sections_table,
         known=lambda archive: any(rod.stiffness for rod in archive.results.rods),

@@ -13,7 +13,7 @@ from rodshell.checks.bending import Bending as BendingCheck
 from rodshell.checks.bending import worst
 from rodshell.fabrication.fabricate import Fabricated
 from rodshell.figures.checks import Bending, Contact, WorstBent
-from rodshell.figures.form import Bent, Rod
+from rodshell.figures.form import Bent, Rod, RodType
 from rodshell.figures.records import Ends
 from rodshell.layout import GridMesh
 from rodshell.loads.check import LoadChecks
@@ -65,7 +65,7 @@ def checked_results(
     erected = way.utilisation if way and known else None
     found = results.changed(
         warnings=(*checks.warnings, *torsion, *results.warnings, *fabricated.warnings),
-        rods=_rods(results.rods, mesh, checks, fabricated, withstood),
+        rods=_rods(results, mesh, checks, fabricated, withstood),
         bending=bending.changed(shear_strength=limits.shear_strength, strength_of=limits.strength_of),
         strength=limits.changed(erection_utilisation=erected),
         reactions=dict(checks.reactions),
@@ -166,15 +166,16 @@ class _Withstood:
 
 
 def _rods(
-    rods: Sequence[Rod], mesh: GridMesh, checks: Checks, fabricated: Fabricated, withstood: _Withstood
+    results: Results, mesh: GridMesh, checks: Checks, fabricated: Fabricated, withstood: _Withstood
 ) -> tuple[Rod, ...]:
     """The rods with how they are cut, and with their bending in the final shape and in all shapes."""
     final, found = final_ends(checks), list[Rod]()
-    for k, rod in enumerate(rods):
+    for k, rod in enumerate(results.rods):
         bent: dict[str, Any] = {}
         if final is not None:
             here = mesh.rod_slice(k)
             bent = Bent(**withstood.worst([checks.bending[final]], (), here)).plain()
+            bent |= _at_splices(results.rod, rod, checks.bending[final], mesh, k, fabricated.splices[k])
             bent["pop_up"] = Bent(**withstood.worst([*checks.bending.values()], checks.deployment_bending, here))
         made = {
             "cut_length": float(fabricated.cut_length[k]),
@@ -191,6 +192,25 @@ def _rods(
             made["stiffness"] = rod.stiffness.changed(splices=beyond)
         found.append(rod.changed(**made, **bent))
     return tuple(found)
+
+
+def _at_splices(
+    kind: RodType | None, rod: Rod, bent: BendingCheck, mesh: GridMesh, k: int, splices: Sequence[float]
+) -> dict[str, tuple[float, ...]]:
+    """What a rod of one section passes on at its splices: bending moments and axial forces."""
+    if not splices or kind is None or kind.EA is None or rod.stiffness is not None:
+        return {}
+    if kind.EI is not None:
+        moment = kind.EI * bent.curvature
+    elif kind.EI1 is not None and kind.EI2 is not None and bent.normal_curvature is not None:
+        assert bent.geodesic_curvature is not None
+        moment = np.hypot(kind.EI1 * bent.normal_curvature, kind.EI2 * bent.geodesic_curvature)
+    else:
+        return {}
+    here = mesh.rod_slice(k)
+    at = mesh.stations[here] - mesh.grid.rods[k].start
+    every = {"splice_moments": moment, "splice_forces": kind.EA * bent.axial_strain}
+    return {name: tuple(np.interp(splices, at, values[here]).tolist()) for name, values in every.items()}
 
 
 def _bending(checks: Checks, withstood: _Withstood, positions: Mapping[Ends, Floats]) -> Bending:

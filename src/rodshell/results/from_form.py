@@ -82,7 +82,7 @@ def states_of(stages: Stages) -> States:
         on_target = [(part.target, part.boundary.draped) for part in stages.parts]
         gaps = [target.gap(there).distance for target, there in on_target if there is not None]
         states["gap_draped"] = np.concatenate(gaps) - mesh.heights
-        points, faces = surface_mesh(stages.target, draped)  # of the target under the shell, for pictures
+        points, faces = surface_mesh(stages.target, draped)  # of the whole target, for pictures
         states |= {
             "draped": draped,
             "target_points": points.astype(np.float32),

@@ -24,7 +24,7 @@ from rodshell.results.facts import mass_text
 from rodshell.results.from_form import rod_type
 from rodshell.schema import written
 from rodshell.targets import Target
-from rodshell.targets.surface_mesh import BEYOND, surface_mesh
+from rodshell.targets.surface_mesh import surface_mesh
 
 Figures = list[tuple[str, str]]
 Surface = tuple[NDArray[np.float32], Ints]  # points [m] and triangles
@@ -34,7 +34,7 @@ class Preview:
     """Shows forms one after the other; the triangles of a target are kept while shells lie on the same part of it."""
 
     def __init__(self) -> None:
-        self._kept: tuple[Target, Floats, Surface] | None = None  # with the box, in plan, of the shell of the triangles
+        self._kept: tuple[Target, Surface] | None = None
 
     def of(self, form: Form) -> tuple[dict[str, Any], bytes]:
         """Facts and scene of a form on a target, with or without popped-up shells."""
@@ -71,17 +71,15 @@ class Preview:
             *_joints(mesh),
             [(shape, colours(shape)) for shape in shapes],
             partial(section_outline, rod_type(form.rod).section),
-            self._surface_under(target, draped),
+            self._surface_of(target, draped),
         )
         return drawn.scene().content()
 
-    def _surface_under(self, target: Target, draped: Floats) -> Surface:
-        box = np.array([draped[:, :2].min(axis=0), draped[:, :2].max(axis=0)])
-        room = 0.5 * BEYOND * float(np.ptp(box, axis=0).max())
-        if self._kept is None or target is not self._kept[0] or np.abs(box - self._kept[1]).max() > room:
+    def _surface_of(self, target: Target, draped: Floats) -> Surface:
+        if self._kept is None or target is not self._kept[0]:
             points, faces = surface_mesh(target, draped)
-            self._kept = target, box, (points.astype(np.float32), faces)
-        return self._kept[2]
+            self._kept = target, (points.astype(np.float32), faces)
+        return self._kept[1]
 
 
 def facts(form: Form) -> dict[str, Any]:

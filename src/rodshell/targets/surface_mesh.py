@@ -3,30 +3,35 @@
 import numpy as np
 
 from rodshell.arrays import Floats, Ints
+from rodshell.geometry.bounds import bounds
 from rodshell.targets.nurbs import grid_triangles
 from rodshell.targets.target import Target
 from rodshell.targets.trianglemesh import turned
 
-CELLS = 56  # along the longer side of the plan
-BEYOND = 0.08  # of the plan's width: how far outside the points the surface is shown
+CELLS = 64  # along the longer side of the plan
+GROWTHS = 6  # of the box in which the surface is looked for, by its half to all sides; none is shown outside
 HALVINGS = 14  # of a mesh edge that crosses the end
 
 
 def surface_mesh(target: Target, around: Floats) -> tuple[Floats, Ints]:
-    """Points (n, 3) [m] and triangles (t, 3) of the uppermost part of a target, over the plan of some points.
+    """Points (n, 3) [m] and triangles (t, 3) of the uppermost part of a target, all of it that is seen from above.
 
-    It is made for pictures: the surface is sampled on a square mesh, whose triangles are cut at the end of the shell.
+    It is made for pictures: the surface is sampled on a square mesh, whose triangles are cut at the end of the surface.
     What lies under an overhang is left out.
 
     Args:
-        around: (k, 3) points of a shell on the target [m].
+        around: (k, 3) points of a shell on the target [m], from which the rest of it is found.
     """
-    low, high = around[:, :2].min(axis=0), around[:, :2].max(axis=0)
-    step = float((high - low).max()) * (1 + 2 * BEYOND) / CELLS
-    counts = np.ceil((high - low) * (1 + 2 * BEYOND) / step).astype(int)
-    corner = 0.5 * (low + high - counts * step)
-    x, y = (corner[k] + step * np.arange(counts[k] + 1) for k in range(2))
-    plan = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    low, high = bounds(around[:, :2])
+    for _ in range(GROWTHS):
+        plan, _, _, step = _sampled(low - 0.5 * (high - low), high + 0.5 * (high - low))
+        there = plan[_lifted(target, plan)[1]]
+        found = bounds(np.concatenate([there, around[:, :2]]))
+        grown = np.any((found[0] < low - step) | (found[1] > high + step))
+        low, high = found
+        if not grown:
+            break
+    plan, x, y, _ = _sampled(low - step, high + step)
     points, inside = _lifted(target, plan)
     faces = grid_triangles(len(x), len(y))
     count = inside[faces].sum(axis=1)
@@ -36,6 +41,13 @@ def surface_mesh(target: Target, around: Floats) -> tuple[Floats, Ints]:
     faces = np.concatenate([faces[count == 3], cut])
     used = np.unique(faces)
     return points[used], np.searchsorted(used, faces)
+
+
+def _sampled(low: Floats, high: Floats) -> tuple[Floats, Floats, Floats, float]:
+    """Points (n, 2) of a square mesh over a rectangle of the plan, its lines of x and of y, and its step."""
+    step = float((high - low).max()) / CELLS
+    x, y = (low[k] + step * np.arange(int(np.ceil((high[k] - low[k]) / step)) + 1) for k in range(2))
+    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2), x, y, step
 
 
 def _lifted(target: Target, plan: Floats) -> tuple[Floats, np.ndarray]:

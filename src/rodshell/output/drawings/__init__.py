@@ -50,7 +50,7 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
     if not _braced(archive):
         layouts.pop("bracing", None)
     checked = _checked(archive.results)
-    about = {"supports": _held(archive), "bracing": checked, "rods": checked}
+    about = {"supports": _held(archive), "bracing": checked, "rods": checked, "splices": checked}
 
     def listed(name: str) -> Iterator[Sheet]:
         schedule = SCHEDULES[name]
@@ -62,7 +62,7 @@ def sheet_set(archive: Archive) -> tuple[list[Drawing], Paper]:
         found += layout.sheets(paper)
         if name in SCHEDULES:
             found += listed(name)
-    for name in ("rods", "joints", "sections", "seams", "stock"):
+    for name in ("rods", "joints", "splices", "sections", "seams", "stock"):
         if SCHEDULES[name].known(archive):
             found += listed(name)
     return sheets.bound(found, sheets.title_block(archive, plan.summary), paper), paper
@@ -98,7 +98,7 @@ def _layouts(archive: Archive) -> dict[str, Layout]:
     extent = np.ptp(np.concatenate([plan.cuts.reshape(-1, 2), *plan.footprint]), axis=0)
     layouts = dict[str, Layout]()
     if lies_flat(archive):
-        layouts["plan"] = sheets.laid_out(partial(flat.flat_drawing, plan), extent, paper, plan.text, true_size=True)
+        layouts["plan"] = sheets.laid_out(partial(flat.flat_drawing, plan), extent, paper, plan.text)
     for name, (compose, extent) in _of_the_shell(archive).items():
         text, template = FINER.get(name, 1.0) * plan.text, name == "supports"
         layouts[name] = sheets.laid_out(compose, extent, paper, text, true_size=template)

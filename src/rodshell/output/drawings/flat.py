@@ -18,7 +18,7 @@ from rodshell.figures.form import Stiffness
 from rodshell.geometry.boxes import lines_meet
 from rodshell.output.blanks import Blank, blanks_of
 from rodshell.output.drawing import FAMILIES, INK, LETTER, LINE, PAPER, SMALL, Drawing, Pen, Pencil, Text
-from rodshell.output.grid import GridJoint, GridRod, family_numbers, joints_of, opens, outlines_of, rods_of
+from rodshell.output.grid import GridJoint, GridRod, family_numbers, holes_text, joints_of, opens, outlines_of, rods_of
 from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, place, segments, spread, take
 from rodshell.output.schedules import Show
 from rodshell.results import Archive
@@ -32,9 +32,11 @@ LARGEST = 0.85  # size of a joint's id at most, in text sizes
 GAP = 0.06  # from an id to a rod, in text sizes
 CORNERS = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 _STRIPS_TITLE = "Rod strips, distances from the cut end of the rod's start in mm"
+TURNED = "*"  # after the name of a rod that equals the others of its strip when it is turned end for end
 _STRIPS_LEGEND = (
-    "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice; "
-    "S2: of the second lath.",
+    "Datum: left, the cut end of the rod's start. Full mark: the other rod lies over this one. S: splice "
+    "(table Splices); S2: of the second lath.",
+    f"Equal rods: the rods met and full marks are those of the first; {TURNED} turned, measured from its other end.",
     "Open triangle: support. Arrow: the section's size there [mm], or from there on the number of laths (L).",
 )
 _CURVED = "Curved laths: distances along the centre line of the blank, seen from above."
@@ -47,7 +49,8 @@ _SIGNS = {
 }
 TALL = 15.0  # text sizes from strip to strip
 SLOT = 5.0  # further ones where widths of slots are written
-MOST_EQUAL = 8  # rods that one strip stands for: their names have room below it
+MOST_EQUAL = 16  # rods that one strip stands for: their names have room below it
+ALIKE = 1e-4  # m: by which lengths and holes of equal rods differ at most, or half a digit where that is less
 LEADING = 1.4  # text sizes from line to line of the legend
 
 
@@ -68,6 +71,7 @@ class FlatPlan:
         laths: how much lies on the rods, in words; "" where nothing does.
         blanks: outlines by the names of rods that are more than a length, see `blanks_of` [m].
         slot_depth: of strips that cross by slots [m].
+        holes: at the joints, in words; "" where there are slots.
     """
 
     rods: list[GridRod]
@@ -83,6 +87,7 @@ class FlatPlan:
     laths: str
     blanks: dict[str, Blank]
     slot_depth: float | None
+    holes: str
 
     @cached_property
     def extent(self) -> float:
@@ -145,22 +150,29 @@ class FlatPlan:
 
     @cached_property
     def equal(self) -> dict[str, list[str]]:
-        """The first of rods whose strips are the same within half a digit, and all of them, at most MOST_EQUAL."""
-        layer, groups = {rod.id: rod.record.layer for rod in self.rods}, list[tuple[object, Floats, list[str]]]()
+        """The first of rods that are cut and drilled alike within ALIKE, and all of them, at most MOST_EQUAL; those
+        that have to be turned end for end for it have a `TURNED` after their names."""
+        groups = list[tuple[object, Floats, list[str]]]()
         for rod in self.rods:
-            blank, here, along = self.blanks.get(rod.id), rod.record.layer, rod.record.stiffness
-            met = [(joint.other, _over(layer.get(joint.other), here)) for joint in rod.record.joints]
-            outline = np.empty(0) if blank is None else blank.outline.ravel()
-            marks = [(joint.at, joint.slot or 0.0) for joint in rod.record.joints]
-            numbers = [rod.cut_length, rod.allowance, *np.ravel(marks), *rod.record.splices, *outline]
-            words, sizes = (here, met, along, len(rod.record.splices)), np.array(numbers)
-            for same, first, ids in groups:
-                near = same == words and first.shape == sizes.shape and len(ids) < MOST_EQUAL
-                if near and np.allclose(first, sizes, rtol=0.0, atol=0.5e-3 * self.rounding.step):
-                    ids.append(rod.id)
-                    break
-            else:
+            blank, along, end = self.blanks.get(rod.id), rod.record.stiffness, rod.length
+            holes = np.array([(joint.at, joint.slot or 0.0) for joint in rod.record.joints]).reshape(-1, 2)
+            cuts, outline = np.array(rod.record.splices), [] if blank is None else blank.outline.ravel()
+            words, lengths = (along, len(holes), len(cuts)), [rod.cut_length, rod.allowance]
+            sizes = np.concatenate([lengths, *holes, cuts, outline])
+            turned = np.concatenate([lengths, *((end, 0.0) + (-1.0, 1.0) * holes[::-1]), end - cuts[::-1]])
+            ways = [("", sizes), (TURNED, turned)] if blank is None and along is None else [("", sizes)]
+            found = (
+                (ids, mark)
+                for same, first, ids in groups
+                for mark, way in ways
+                if same == words and len(ids) < MOST_EQUAL and first.shape == way.shape
+                and np.allclose(first, way, rtol=0.0, atol=min(ALIKE, 0.5e-3 * self.rounding.step))
+            )  # fmt: skip
+            ids, mark = next(found, (None, ""))
+            if ids is None:
                 groups.append((words, sizes, [rod.id]))
+            else:
+                ids.append(rod.id + mark)
         return {ids[0]: ids for _, _, ids in groups}
 
     @property
@@ -186,7 +198,7 @@ def flat_plan(archive: Archive) -> FlatPlan:
         [1e3 * footprint[loop] for loop in loops],
         [1e3 * boundary[loop] for loop in loops] if len(boundary) == len(footprint) else [],
         rounding_of(archive.results), laths_text(archive.results), blanks_of(archive),
-        archive.results.fabrication.slot_depth if archive.results.fabrication else None,
+        archive.results.fabrication.slot_depth if archive.results.fabrication else None, holes_text(archive),
     )  # fmt: skip
 
 
@@ -374,7 +386,8 @@ def strip_size(plan: FlatPlan, rod: GridRod, text: float) -> tuple[float, float]
 def _legend(plan: FlatPlan) -> list[str]:
     curved = [_CURVED] if any(rod.record.rest_curvature for rod in plan.rods) else []
     slots = [] if plan.slot_depth is None else [_SLOTS.format(plan.rounding.mm(plan.slot_depth))]
-    return [*_STRIPS_LEGEND, *curved, *slots]
+    holes = [f"Round marks: {plan.holes}."] if plan.holes else []
+    return [*_STRIPS_LEGEND, *holes, *curved, *slots]
 
 
 def _strip(
@@ -384,8 +397,11 @@ def _strip(
     """One rod, or equal ones: above it the distances and the rods that are met there, below it what it is."""
     cut, start = 1e3 * rod.cut_length, 1e3 * rod.from_cut_end(0.0)
     note = f"{rod.id}: {mm(rod.cut_length)} mm"
-    named = ", ".join(ids) if len(ids) == 1 else f"{len(ids)} \N{MULTIPLICATION SIGN} {', '.join(ids)}"
-    words = [named, f"cut {mm(rod.cut_length)}", f"layer {rod.record.layer}" if rod.record.layer is not None else ""]
+    by_layer = dict[int | None, list[str]]()
+    for name in ids:
+        by_layer.setdefault(layer.get(name.removesuffix(TURNED)), []).append(name)
+    named = ", ".join(f"{', '.join(some)}{f' (layer {on})' if on is not None else ''}" for on, some in by_layer.items())
+    words = [f"{len(ids)} \N{MULTIPLICATION SIGN} {named}" if len(ids) > 1 else named, f"cut {mm(rod.cut_length)}"]
     if blank is None:
         pencil.line([(0.0, y), (cut, y)], "CUT", name=rod.id, note=note)
     else:

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from itertools import product
+from itertools import product, zip_longest
 from math import ceil
 from textwrap import wrap
 
@@ -19,7 +19,7 @@ from rodshell.figures.form import Material, RodType
 from rodshell.figures.records import json_text
 from rodshell.geometry.boxes import length_beneath
 from rodshell.output.drawing import INK, LETTER, PAPER, SMALL, SOFT, TEXT, Drawing, Pen, Pencil, Text, within
-from rodshell.output.grid import supported
+from rodshell.output.grid import holes_text, supported
 from rodshell.output.labels import Label, Room, closed_segments, nearby, segments, take, thin
 from rodshell.output.schedules import Table, head
 from rodshell.results import Archive
@@ -43,6 +43,7 @@ SCALES = (1, 2, 2.5, 3, 4, 5, 7.5, 10, 15, 20, 25, 30, 40, 50, 75, 100, 150, 200
 FINE = SMALL * TEXT  # of tables and of the title block: capitals of 1.9 mm, the least on a sheet
 MARGIN, BLOCK = 10.0, 34.0  # around the frame; height of the title block
 ROW = 1.45 * FINE  # from line to line of the title block
+LONGEST = 64  # letters in a line of a cell
 _LEADING = 1.9 * FINE  # from line to line of a table
 OVERLAP = 10.0  # mm of paper that a sheet shows beyond its match lines
 _MOST_TILES = 12  # sheets that the parts of one drawing may take
@@ -88,7 +89,7 @@ def title_block(archive: Archive, summary: str) -> TitleBlock:
         ("Revision", given.revision or "-"),
         ("Section", section_text(rod.section) or NOT_GIVEN),
         ("Material", _material(rod.material) or NOT_GIVEN),
-        ("Joints", _in_words(joint_rows(results.joint)) or "ball"),
+        ("Joints", ", ".join(filter(None, [_in_words(joint_rows(results.joint)) or "ball", holes_text(archive)]))),
         ("Supports", supported(final) if (final := archive.final or DRAPED) != DRAPED else "none, as draped"),
         ("Units", f"mm, shown to {rounding_of(results).words}"),
         ("Tolerance", NOT_GIVEN if given.tolerance is None else f"{1e3 * given.tolerance:g} mm"),
@@ -210,7 +211,7 @@ class Layout:
             yield from tiled(self.parts, paper, self.scale_of_parts)
 
 
-def laid_out(compose: Compose, extent: Floats, paper: Paper, finest: float, *, true_size: bool = False) -> Layout:
+def laid_out(compose: Compose, extent: Floats, paper: Paper, finest: float) -> Layout:
     """A drawing, laid out for one sheet and, where that leaves something out, in detail.
 
     The parts are at the smallest scale that shows all, or the largest there is.
@@ -219,22 +220,17 @@ def laid_out(compose: Compose, extent: Floats, paper: Paper, finest: float, *, t
         compose: makes the drawing for a text size [mm at 1:1].
         extent: (2,) at least what the drawing takes without texts [mm].
         finest: size of the texts with which a file at 1:1 shows all that it can [mm].
-        true_size: the parts are at 1:1 wherever that takes no more than MOST_TILES sheets, whatever is left out.
     """
     whole, scale = fitted(compose, extent, paper)
-    detail, parts, of_parts = whole, None, 1.0
+    parts, of_parts = None, 1.0
     possible = [smaller for smaller in SCALES if smaller < scale and _fits_on(extent / smaller, paper)]
-    tried = possible[::-1] if whole.left_out else []
-    if true_size and 1 in possible:
-        tried = [1, *(smaller for smaller in tried if smaller > 1)]
-    for smaller in tried:
+    for smaller in possible[::-1] if whole.left_out else ():
         finer = compose(TEXT * smaller)
         if _fits_on(_size(finer) / smaller, paper):
             parts, of_parts = finer, smaller
-            if not finer.left_out or (true_size and smaller == 1):
+            if not finer.left_out:
                 break
-    if whole.left_out and parts is not None and (of_parts > 1 or not true_size):
-        detail = parts
+    detail = parts or whole
     if detail.left_out and detail.text > finest:
         detail = compose(finest)
     return Layout(whole, scale, detail, parts, of_parts)
@@ -294,8 +290,10 @@ def table(title: str, content: Table, paper: Paper) -> Iterator[Sheet]:
     """A table over as many sheets as it takes, in as many columns side by side as fit."""
     if not content:
         return
-    (low, high), rows = room(paper), list(zip(*content.values(), strict=True))
-    cells = [max(map(len, column), default=0) for column in content.values()]
+    low, high = room(paper)
+    broken = ([wrap(cell, LONGEST) for cell in row] for row in zip(*content.values(), strict=True))
+    rows = [line for row in broken for line in zip_longest(*row, fillvalue="")]
+    cells = [max(map(len, column), default=0) for column in zip(*rows, strict=True)] or [0] * len(content)
     heads = [_wrapped(*head(name), width) for name, width in zip(content, cells, strict=True)]
     widths = [max(width, *map(len, words)) for width, words in zip(cells, heads, strict=True)]
     steps = FINE * (LETTER * np.array(widths) + 1.2)

@@ -12,11 +12,25 @@ import numpy as np
 from rodshell.arrays import Bools, Floats, Ints
 from rodshell.figures.fabrication import Brace
 from rodshell.geometry.bounds import bounds
-from rodshell.geometry.boxes import each_meets
-from rodshell.output.drawing import BACK, INK, LAYERS, LETTER, PALE, SMALL, SOFT, Drawing, Pen, Pencil, Text, corners
+from rodshell.geometry.boxes import each_meets, lines_meet
+from rodshell.output.drawing import (
+    BACK,
+    INK,
+    LAYERS,
+    LETTER,
+    LINE,
+    PALE,
+    SMALL,
+    SOFT,
+    Drawing,
+    Pen,
+    Pencil,
+    Text,
+    corners,
+)
 from rodshell.output.drawings.flat import side_ticks
 from rodshell.output.grid import beams_along_edge, end_nodes, joint_places, meshed_rods, outlines_of
-from rodshell.output.labels import Room, callouts, closed_segments, outward, segments, upright
+from rodshell.output.labels import Label, Room, callouts, closed_segments, outward, segments, spread, upright
 from rodshell.output.schedules import seam_meetings
 from rodshell.results import Archive, Results
 from rodshell.results.judged.deployment import unknown_below
@@ -52,10 +66,14 @@ def _stopped(archive: Archive) -> str:
 
 
 def elevations_drawing(archive: Archive, text: float) -> Drawing:
-    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions."""
-    pencil, curves = Pencil(), final_curves(archive)
+    """The final shape from the front (along y) and, above, from the right (along -x), with overall dimensions and the
+    levels of the lowest and highest rod ends and of the shell."""
+    pencil, curves, marked = Pencil(), final_curves(archive), Pencil()
     heights = np.concatenate(curves)[:, 2]
     tall, rounding = float(np.ptp(heights)) + 10 * text, rounding_of(archive.results)
+    ends = np.concatenate([curve[[0, -1], 2] for curve in curves])
+    known = {level_text(z - ends.min(), rounding): z for some in (ends, heights) for z in (some.min(), some.max())}
+    levels = dict(sorted(known.items(), key=lambda level: float(level[1])))
     for k, (axis, words) in enumerate(((0, "Front elevation: x to the right"), (1, "Right elevation: y to the right"))):
         flat = [np.column_stack([curve[:, axis], curve[:, 2] - heights.min() + k * tall]) for curve in curves]
         pen = Pen(INK, 0.08 * text)
@@ -68,7 +86,20 @@ def elevations_drawing(archive: Archive, text: float) -> Drawing:
         _span(pencil, beside, np.array([beside[0], high[1]]), text, rounding)
         pencil.line([(low[0] - 2 * text, low[1]), (high[0] + 2 * text, low[1])], "DIM")
         pencil.write(words, (low[0], low[1] - 5 * text), 1.2 * text, "LABEL", bold=True)
+        at = np.array([*levels.values()]) - heights.min() + k * tall
+        for name, y, beside in zip(levels, at.tolist(), spread(at, 1.2 * text).tolist(), strict=True):
+            out = high[0] + 2.5 * text
+            marked.line([(out - 2 * text, y), (out, y), (out + 0.8 * text, beside)], "DIM")
+            marked.write(name, (out + text, beside - 0.3 * text), text, "DIM")
+    pencil.paths += marked.paths
+    pencil.texts += marked.texts
     return pencil.done("elevations", f"Elevations{_stopped(archive)}", text)
+
+
+def level_text(above: float, rounding: Rounding) -> str:
+    """A level [mm] above the lowest rod end."""
+    shown = rounding.mm(1e-3 * above)
+    return "\N{PLUS-MINUS SIGN}0" if not float(shown) else shown if shown.startswith("-") else f"+{shown}"
 
 
 def erection_drawing(archive: Archive, text: float) -> Drawing:
@@ -199,7 +230,7 @@ def supports_drawing(archive: Archive, text: float) -> Drawing:
             pencil.line(callout.line, "DIM")
     pencil.leave_out(left_out, int(alone.sum()), "names of rod ends (table Supports has their places)")
     _meetings(pencil, archive, text, room)
-    legend, beams = [*_SUPPORTS_LEGEND], beams_along_edge(archive)
+    legend, beams = [*_SUPPORTS_LEGEND, _levels(pencil, archive, text, room, lines)], beams_along_edge(archive)
     for _, points in beams:
         pencil.line(1e3 * points[:, :2], "BOUNDARY-FINAL", pen=Pen(LAYERS["BOUNDARY-FINAL"].colour, 0.4 * text))
     if beams:
@@ -251,6 +282,25 @@ def _meetings(pencil: Pencil, archive: Archive, text: float, room: Room) -> None
         )
         left_out += not room.write(pencil, tried)
     pencil.leave_out(left_out, sum(1 for _ in seam_meetings(archive.results)), "numbers of meetings (table Seams)")
+
+
+def _levels(pencil: Pencil, archive: Archive, text: float, room: Room, lines: Floats) -> str:
+    """The levels of the joints, to their upper right where there is room, clear of `lines` (m, 2, 2); returns a line of
+    legend on all levels."""
+    rounding, shape = rounding_of(archive.results), archive.states[archive.final or ""]
+    ends = 1e3 * shape[end_nodes(meshed_rods(archive)), 2]
+    for place in joint_places(archive, shape).values():
+        at = 1e3 * place
+        words, size = level_text(at[2] - ends.min(), rounding), SMALL * text
+        half = 0.5 * size * np.array([LETTER * len(words) + 0.6, LINE + 0.3])
+        level = Label(words, at[:2] + half, 0.0, at[:2], moved=False).written(size)._replace(layer="DIM")
+        if not lines_meet(level.box(), lines):
+            room.write(pencil, [level])
+    high = level_text(float(np.ptp(ends)), rounding)
+    where = f"up to {high} (z in table Supports)" if float(high[1:]) else f"all at {high}"
+    return (
+        f"Levels in mm above the lowest rod end: rod ends {where}, of joints to their upper right (z in table Joints)."
+    )
 
 
 # Bracing
