@@ -95,13 +95,16 @@ def _checked(results: Results) -> str:
 def _layouts(archive: Archive) -> dict[str, Layout]:
     """Every drawing but the strips, which are cut into sheets between two rods."""
     plan, paper = flat_plan(archive), _paper(archive)
+    templates = paper == PAPERS["A4"]  # which is printed at a desk, for models
     extent = np.ptp(np.concatenate([plan.cuts.reshape(-1, 2), *plan.footprint]), axis=0)
     layouts = dict[str, Layout]()
     if lies_flat(archive):
-        layouts["plan"] = sheets.laid_out(partial(flat.flat_drawing, plan), extent, paper, plan.text)
+        layouts["plan"] = sheets.laid_out(
+            partial(flat.flat_drawing, plan), extent, paper, plan.text, true_size=templates
+        )
     for name, (compose, extent) in _of_the_shell(archive).items():
-        text, template = FINER.get(name, 1.0) * plan.text, name == "supports"
-        layouts[name] = sheets.laid_out(compose, extent, paper, text, true_size=template)
+        text, true_size = FINER.get(name, 1.0) * plan.text, templates and name == "supports"
+        layouts[name] = sheets.laid_out(compose, extent, paper, text, true_size=true_size)
     return layouts
 
 

@@ -211,7 +211,7 @@ class Layout:
             yield from tiled(self.parts, paper, self.scale_of_parts)
 
 
-def laid_out(compose: Compose, extent: Floats, paper: Paper, finest: float) -> Layout:
+def laid_out(compose: Compose, extent: Floats, paper: Paper, finest: float, *, true_size: bool = False) -> Layout:
     """A drawing, laid out for one sheet and, where that leaves something out, in detail.
 
     The parts are at the smallest scale that shows all, or the largest there is.
@@ -220,11 +220,13 @@ def laid_out(compose: Compose, extent: Floats, paper: Paper, finest: float) -> L
         compose: makes the drawing for a text size [mm at 1:1].
         extent: (2,) at least what the drawing takes without texts [mm].
         finest: size of the texts with which a file at 1:1 shows all that it can [mm].
+        true_size: the parts are templates at 1:1 wherever that takes no more than MOST_TILES sheets.
     """
     whole, scale = fitted(compose, extent, paper)
     parts, of_parts = None, 1.0
     possible = [smaller for smaller in SCALES if smaller < scale and _fits_on(extent / smaller, paper)]
-    for smaller in possible[::-1] if whole.left_out else ():
+    templates = [1] if true_size and 1 in possible else []
+    for smaller in templates or (possible[::-1] if whole.left_out else []):
         finer = compose(TEXT * smaller)
         if _fits_on(_size(finer) / smaller, paper):
             parts, of_parts = finer, smaller
