@@ -65,7 +65,7 @@ print(json.dumps(stages))
 
 @dataclass(frozen=True)
 class Startup:
-    """Median seconds of whole processes (`form` with every default file, with few), of what they are measured by,
+    """Median seconds of whole processes (`form --all`, and with few files), of what they are measured by,
     and of each stage within one process."""
 
     whole: float
@@ -87,7 +87,7 @@ def startup(*, fresh: bool = False, runs: int = RUNS) -> Startup:
         form = [str(scripts / "rodshell"), "form", "hemisphere", "--quiet", "--out", f"{folder}/out"]
         python = [str(scripts / "python"), "-c"]
         commands = {
-            "whole": form, "quick": [*form, *QUICK], "bare": [*python, BARE],
+            "whole": [*form, "--all"], "quick": [*form, *QUICK], "bare": [*python, BARE],
             "help": [str(scripts / "rodshell"), "--help"], "front": [*python, f"import {FRONT}"],
         }  # fmt: skip
         for command in commands.values():  # compiles the kernels, once
@@ -119,7 +119,7 @@ def _output(command: Sequence[str], folder: str) -> str:
 
 
 def section(runs: int) -> Section:
-    """Seconds of processors of whole processes, `rodshell form hemisphere` with every default file; the solve is
+    """Seconds of processors of whole processes, `rodshell form hemisphere --all`; the solve is
     `rs.find_form` in a process that loads its kernels from disk; the checks are the deployment from flat."""
     return _section(startup(runs=runs))
 

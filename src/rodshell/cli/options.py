@@ -102,12 +102,12 @@ class RunOptions:
     """Options of the commands that run a job, of their output.
 
     Args:
-        kinds: of files in addition to the archive; None: the usual ones, and those that the case asks for.
+        only: kinds of files in addition to the archive; None: the usual ones, and those that the case asks for.
         limit: longest time for all but the files [s].
     """
 
     out: str | None
-    kinds: list[str] | None
+    only: str | None
     limit: float | None
     force: bool
     as_json: bool
@@ -133,12 +133,12 @@ _LIMIT = 'Time limit, such as "60 s": what was found by then is written, and kin
 def output_options(out: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """The options of `RunOptions`, with the help of --out; a command gets them as `output`.
 
-    It raises an InputError where there is no such kind of file, or the time limit is not a time, or not a positive one.
+    It raises an InputError where the time limit is not a time, or not a positive one.
     """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         def with_output(*, out, only, time_limit, force, as_json, quiet, verbose, **values):  # type: ignore[no-untyped-def]
-            output = RunOptions(out, wanted_kinds(only), seconds_of(time_limit), force, as_json, quiet, verbose)
+            output = RunOptions(out, only, seconds_of(time_limit), force, as_json, quiet, verbose)
             return command(output=output, **values)
 
         found: Callable[..., Any] = wraps(command)(with_output)
@@ -189,15 +189,6 @@ def under_usual_loads(
     if "loads" in overrides:
         raise InputError("--loads FILE has loads of its own: leave it out, or --snow, --wind and --own")
     return load_case(name, {**overrides, **usual_loads(snow, wind)})
-
-
-def wanted_kinds(only: str | None) -> list[str] | None:
-    """The kinds of files that --only names; InputError where there is no such kind."""
-    if only is None:
-        return None
-    from rodshell.output import files
-
-    return files.wanted_kinds(only)
 
 
 def seconds_of(given: str | None) -> float | None:

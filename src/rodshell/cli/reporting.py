@@ -150,7 +150,7 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
     from rodshell.results.folder import open_folder
     from rodshell.results.offers import offered
 
-    kinds = wanted_kinds(output.kinds, case.drawings.files)
+    kinds = wanted_kinds(output.only, case.drawings.files)
     names = ["result.json", "states.npz", *_names_of(case), *reserved(kinds)]
     with open_folder(output.out or default_folder(name), reserved=names, force=output.force) as place:
         compile_before_first(quiet=output.quiet)

@@ -90,7 +90,7 @@ class DrawingStyle:
     name: Annotated[str, "title of the drawings; default: the target's name"] = ""
     author: Annotated[str, "who drew them or is responsible for them, for the title block"] = ""
     date: Annotated[IsoDate, 'date for the title block, such as "2026-11-22"; default: today'] = ""
-    files: Annotated[str, 'files beyond the report, schedules and strips, such as "pdf, obj", or "all"'] = ""
+    files: Annotated[str, 'files beyond those written by default, such as "pdf, obj", or "all"'] = ""
 
     def __post_init__(self) -> None:
         for key in ("paper", "project", "revision", "name", "author", "date", "files"):
