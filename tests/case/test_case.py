@@ -317,6 +317,11 @@ def test_a_key_by_its_old_name_is_read_with_a_warning(load: Any, monkeypatch: py
         assert load('drape.method = "gravity"\nlayout.edge = 0.004', {"drape.weight": 1.6}) == wanted
 
 
+def test_a_key_that_is_gone_is_read_with_a_warning_and_left_out(load: Any) -> None:
+    with pytest.warns(RenamedKeyWarning, match=r"the key refine.offer is no longer read: leave it out"):
+        assert load('refine = { vary = "taper", offer = "off" }') == load('refine.vary = "taper"')
+
+
 def test_a_case_is_also_its_text_or_its_tables() -> None:
     case = load_case("cap", {"target.base": "50 mm", "rod.section.radius": "2 mm"})
     assert load_case(case.to_toml()) == case

@@ -68,7 +68,6 @@ class FakeForm:
     refined: None
 
     told: ClassVar = list[OutputOptions]()
-    from_table: ClassVar = True  # which makes no offer to refine it
     known_loaded: ClassVar = None
 
     def finished(self, progress: Callable[[str, str, float], None]) -> "FakeForm":
@@ -412,24 +411,6 @@ def test_out_of_time_before_anything_was_found_keeps_the_old_result(
     )
     assert "out of time after 1e-06 s in stage net (iteration 1); nothing was found yet" in said
     assert Path("dome/case.toml").read_bytes() == before
-
-
-def test_the_time_limit_is_one_for_the_job_and_the_offer_to_refine_it(
-    finder: FakeFinder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def offer(form: object, progress: object, in_time: Any) -> str:
-        now.append(50.0)
-        in_time("offer", "double laths, design 1", 0.0)
-        now.append(200.0)
-        with pytest.raises(rodshell.OutOfTimeError, match="out of time after 100 s in stage offer"):
-            in_time("offer", "double laths, design 2", 0.0)
-        return ""
-
-    now = [0.0]
-    monkeypatch.setattr("rodshell.progress.monotonic", lambda: now[-1])
-    monkeypatch.setattr("rodshell.cli.reporting._offer", offer)
-    assert main(["form", "hemisphere", "--time-limit", "100 s", "-v"]) == 0
-    assert now[-1] == 200.0
 
 
 def test_out_of_time_is_said_as_such(finder: FakeFinder, capsys: pytest.CaptureFixture[str]) -> None:

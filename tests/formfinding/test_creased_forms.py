@@ -97,7 +97,7 @@ def test_a_groined_shell_forms_in_four_patches_from_the_command_line(mesh, tmp_p
         "--checks.stages",
         "0",
     ]
-    options += ["--refine.offer", "off", "--out", str(tmp_path / "out"), "--force"]
+    options += ["--out", str(tmp_path / "out"), "--force"]
     assert main(["form", str(tmp_path / "groin.obj"), *options]) == 2
     said = capsys.readouterr().err
     assert "creased" in said

@@ -7,7 +7,6 @@ import numpy as np
 
 import rodshell as rs
 from rodshell.output.drawings import drawing_set
-from rodshell.refining.offer import offer
 
 
 def _forms() -> Iterator[object]:
@@ -20,11 +19,10 @@ def _forms() -> Iterator[object]:
 
 
 def _commands() -> Iterator[object]:
-    """What `rodshell form` does: the checks of a form, the offer of a refinement, and the drawings."""
+    """What `rodshell form` does: the checks of a form, and the drawings."""
     small = {"layout.rods": "5x5", "layout.spacing": "80 mm", "layout.edge": "40 mm"}
     form = rs.Job.load("hemisphere", small).run()
     yield form.stages
-    yield offer(form.stages)
     yield drawing_set(form.archive())
 
 

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 PAGES = {page.stem: page for room in ("start", "tutorials") for page in sorted((ROOT / "docs" / room).glob("*.md"))}
-QUICK = ["--checks.stages", "0", "--refine.offer", "off"]  # of the form's checks, what the pages do not speak of
+QUICK = ["--checks.stages", "0"]  # of the form's checks, what the pages do not speak of
 OF_STAGES = ["schedule/end_paths.csv"]
 UNBUILDABLE = {"out/thick", "out/dropped", "out/paraboloid"}
 SAID = {

@@ -11,14 +11,10 @@ import pytest
 import rodshell as rs
 from rodshell.case.stage_tables import FAMILIES as WORDS
 from rodshell.cli import main
-from rodshell.errors import OutOfTimeError
-from rodshell.formfinding.pipeline import Agreement, Stages
-from rodshell.formfinding.popup import PopUp
+from rodshell.formfinding.pipeline import Stages
 from rodshell.output.viewer.scene import scene_of
 from rodshell.refining import acceptance
-from rodshell.refining import offer as of_offer
 from rodshell.refining.gates import Gates
-from rodshell.refining.offer import offer
 from rodshell.refining.refine import FAMILIES
 
 COARSE = ("--layout.spacing", "60 mm", "--checks.stages", "0", "--only", "csv", "--quiet")
@@ -107,97 +103,6 @@ def test_refine_in_python_is_the_job_with_the_key() -> None:
     assert better.case.refine.vary == ("taper",)
     assert better.agreement["pinned"].rms == pytest.approx(form().agreement["pinned"].rms, rel=1e-6)
     np.testing.assert_allclose(better.popped["pinned"].positions, form().popped["pinned"].positions, atol=1e-9)
-
-
-def test_the_offer_foretells_what_refining_by_double_laths_gains() -> None:
-    plain = job().changed(refine__vary="", pop_up__ends="both").run(until="pop-up")
-    found = offer(plain.stages)
-    assert found is not None
-    assert (found.ends, found.before) == ("pinned", plain.agreement["pinned"].rms_relative)
-    better = rs.refine(plain, "double", ends="pinned")
-    assert better.agreement["pinned"].rms_relative <= 1.01 * found.after  # it ends where a step gains less than that
-    assert found.after < 1.2 * better.agreement["pinned"].rms_relative
-    assert found.factorizations <= 10
-    assert 0.05 <= found.shares[0] <= found.shares[1] <= 0.95
-    assert "--vary double --ends pinned" in found.words
-    assert "with clamped ends, which need supports that hold the rods' directions, it is" in found.words
-
-
-def test_a_form_whose_rods_have_profiles_gets_no_offer() -> None:
-    assert offer(form().stages) is None
-
-
-def test_the_offer_finds_a_gain_where_rods_are_double_nearly_from_end_to_end() -> None:
-    laths = {"rod.section.kind": "rectangle", "rod.section.width": "1 mm", "rod.section.height": "3 mm"}
-    plain = rs.Job.load("hemisphere", {**laths, **PINNED, "joint.kind": "pin"}).run(until="pop-up")
-    found = offer(plain.stages)
-    assert found is not None
-    assert found.after < 0.9 * found.before
-    assert found.shares == (0.9, 0.9)
-
-
-def test_the_offer_says_that_no_gain_was_found() -> None:
-    plain = rs.Job.load("hemisphere", {**PINNED, "pop_up.ends": "clamped"}).run(until="pop-up")
-    found = offer(plain.stages)
-    assert found is not None
-    assert found.after >= found.before
-    assert found.words.startswith("no gain by double laths was found with clamped ends")
-    assert "->" not in found.words
-
-
-@pytest.mark.parametrize("stable", [0, 1, 2])
-def test_the_offer_is_of_the_designs_that_are_stable(stable: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    plain, popped_up, shares = rs.Job.load("hemisphere", PINNED).run(until="pop-up"), of_offer._popped_up, list[float]()
-
-    def first_ones(patch: Stages, share: float, like: PopUp) -> PopUp:
-        shares.append(share)
-        found = popped_up(patch, share, like)
-        lost = replace(found.equilibrium.report, negative_modes=1)
-        keeps = len(shares) <= stable
-        return found if keeps else replace(found, equilibrium=replace(found.equilibrium, report=lost))
-
-    monkeypatch.setattr(of_offer, "_popped_up", first_ones)
-    found = offer(plain.stages)
-    assert len(shares) == stable + 1
-    assert (found is None) == (stable == 0)
-    if found is not None:
-        assert found.shares[0] in shares[:stable]
-
-
-def test_the_third_share_is_that_of_the_least_squares_of_gaps_that_are_linear_in_it() -> None:
-    start, slope = np.array([0.3, -1.0, 0.6]), np.array([-0.5, 1.3, -0.4])
-    best = -float(start @ slope) / float(slope @ slope)
-    gaps = [Agreement(start + share * slope, 1.0, 1.0, (0.0, 0.0, 0.0), 1.0) for share in (0.55, 0.65)]
-    designs = [of_offer._Design(share, gap) for share, gap in zip((0.55, 0.65), gaps, strict=True)]
-    assert 0.65 < best < 0.9
-    assert of_offer._next_share(designs, gaps[0]) == pytest.approx(best, rel=1e-12)
-    assert of_offer._next_share(designs[::-1], gaps[0]) == pytest.approx(best, rel=1e-12)
-
-
-@pytest.mark.parametrize("in_time", [0, 1])
-def test_the_offer_keeps_what_it_found_in_time(in_time: int) -> None:
-    plain, told = rs.Job.load("hemisphere", PINNED).run(until="pop-up"), list[str]()
-
-    def late(stage: str, detail: str, residual: float) -> None:
-        told.append(detail)
-        if len(told) > in_time:
-            raise OutOfTimeError("the time is over")
-
-    found = offer(plain.stages, progress=late)
-    assert (found is None) == (in_time == 0)
-    assert told == [f"double laths, design {k + 1}" for k in range(in_time + 1)]
-    whole = offer(plain.stages)
-    assert whole is not None
-    assert found is None or whole.after < found.after < found.before
-
-
-def test_the_offer_for_patches_is_of_all_of_them() -> None:
-    seam = {"seams.lines": [[["0 mm", "-1 m"], ["0 mm", "1 m"]]]}
-    plain = rs.Job.load("hemisphere", PINNED | seam).run(until="pop-up")
-    found = offer(plain.stages)
-    assert found is not None
-    assert len(plain.patches) == 2
-    assert found.after < found.before == plain.agreement["pinned"].rms_relative
 
 
 def test_a_refined_form_in_patches_is_one_shell_in_the_states_of_all() -> None:

@@ -75,8 +75,9 @@ FILE_KEYS = file_keys()
 TABLES_OF_RODS = ("rod", "joint", "checks", "fabrication", "drawings")
 """What a case about a table of rods has, in place of a target with its layout and drape."""
 
-RENAMED: dict[str, str] = {}
-"""Keys that were called otherwise in the last version, old -> new: still read, with a warning, for this version."""
+RENAMED: dict[str, str] = {"refine.offer": ""}
+"""Keys that were called otherwise in the last version, old -> new: still read, with a warning, for this version; ""
+stands for one that is gone."""
 
 
 _UNDESCRIBED_BEFORE = (
@@ -232,7 +233,11 @@ def _rename(raw: _Raw, overrides: dict[str, object]) -> None:
         new_table, _, new_name = new.rpartition(".")
         table = _found_table(raw, old_table)
         if old in overrides or old_name in table:
-            warnings.warn(f"the key {old} is now called {new}: rename it", RenamedKeyWarning, stacklevel=2)
+            said = f"is now called {new}: rename it" if new else "is no longer read: leave it out"
+            warnings.warn(f"the key {old} {said}", RenamedKeyWarning, stacklevel=2)
+        if not new:
+            overrides.pop(old, None)
+            table.pop(old_name, None)
         if old in overrides:
             overrides.setdefault(new, overrides.pop(old))
         if old_name in table:

@@ -182,7 +182,6 @@ class RefineTable:
     under: Annotated[str, "meet the target under nothing, weight, or a combination of loads"] = "nothing"
     tolerance: Annotated[Length | None, "largest error of a span as it is built; default: 0.05 % of the size"] = None
     start: Annotated[Numbers | None, "design to begin with, as an interrupted search prints it"] = None
-    offer: Annotated[Literal["on", "off"], "say of any form what double laths would gain"] = "on"
 
     def build(self) -> "tuple[Family, ...]":
         """The families that are varied."""

@@ -58,7 +58,7 @@ def _design(folder: Path, case: Case) -> dict[str, object]:
     from rodshell.results.archive import read
 
     kept = read(folder)
-    same = replace(load_case(str(folder / "case.toml")).refine, start=None, offer="on")
-    if "design" not in kept.states or same != replace(case.refine, start=None, offer="on"):
+    same = replace(load_case(str(folder / "case.toml")).refine, start=None)
+    if "design" not in kept.states or same != replace(case.refine, start=None):
         return {}
     return {"refine.start": kept.states["design"].tolist()}

@@ -24,7 +24,6 @@ from rodshell.kernels import COMPILED
 from rodshell.kernels.cache import kernels_are_kept
 from rodshell.printed import say
 from rodshell.progress import Bar, limited, where
-from rodshell.progress import Progress as ProgressFunction
 
 if TYPE_CHECKING:
     from rodshell.form import Form
@@ -167,7 +166,7 @@ def run_and_deliver(case: Case, name: str, output: RunOptions, *, formed_before:
         summary = archive.summary(verbose=output.verbose)
         if output.verbose:
             searched = form.search.table() if form.search is not None else ""
-            summary = "\n".join(filter(None, [searched, summary, _offer(form, progress, in_time)]))
+            summary = "\n".join(filter(None, [searched, summary]))
         outcome = Outcome(
             archive.results.status,
             summary,
@@ -206,17 +205,6 @@ def _pictures(form: "Form") -> dict[str, str]:
 
     title = f"{form.search.title} by anchor and heading"
     return {SEARCH: search_svg(title, form.search.trials, form.search.best)}
-
-
-def _offer(form: "Form", progress: Progress, in_time: ProgressFunction) -> str:
-    """What double laths would gain, of a form that is not refined, unless the case switches it off."""
-    if form.case.refine.offer == "off" or form.refined is not None or form.from_table:
-        return ""
-    from rodshell.refining.offer import offer
-
-    with progress:
-        found = offer(form.stages, progress=in_time)
-    return "" if found is None else f"  refine    {found.words}"
 
 
 def deliver(outcome: Outcome, place: "ResultFolder", *, progress: Progress, as_json: bool, quiet: bool) -> int:
