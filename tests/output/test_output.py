@@ -197,7 +197,7 @@ def test_dxf_has_both_boundaries(out: Path, archive: Archive) -> None:
 def test_svg_is_at_true_scale(out: Path) -> None:
     root = ET.parse(out / "drawings/plan.svg").getroot()
     box = [float(value) for value in root.attrib["viewBox"].split()]
-    assert root.attrib["width"] == f"{box[2]:g}mm"
+    assert root.attrib["width"] == f"{box[2]:.3f}".rstrip("0").rstrip(".") + "mm"
     assert root.attrib["height"] == f"{box[3]:g}mm"
     assert {text.text for text in root.iter(f"{SVG}text")} >= {"U01", "V09", "sample dome: flat plan, 1:1"}
 

@@ -51,27 +51,23 @@ def _cut(sizes: Floats, wanted: Ints) -> tuple[list[Ints], int]:
         sizes: (n,) ascending shares of a bar that a piece of each kind takes, its saw cut included.
         wanted: (n,) pieces of each kind.
     """
-    left, done, best, fewest, rounds = (
-        wanted.copy(),
-        list[Ints](),
-        _first_fit(sizes, wanted),
-        _at_least(sizes, wanted),
-        0,
-    )
+    left, done, rounds = wanted.copy(), list[Ints](), 0
+    best, fewest = _first_fit(sizes, wanted), _at_least(sizes, wanted)
     patterns = np.unique([*best, *np.diag(np.minimum(1.0 // sizes, wanted).astype(np.intp))], axis=0)
     while len(best) > fewest and left.any():
         needed = 0 if done else fewest
         while True:
             found = linprog(np.ones(len(patterns)), A_ub=-patterns.T, b_ub=-left, method="highs")
-            if rounds == ROUNDS or needed >= ceil(found.fun - WORTH):
+            value, shares = float(found.fun or 0.0), np.asarray(found.x, dtype=np.float64)
+            if rounds == ROUNDS or needed >= ceil(value - WORTH):
                 break
             more, worth = _worth_most(sizes, left, -found.ineqlin.marginals)
-            needed = max(needed, ceil(found.fun / worth - WORTH))  # a bound, whatever the patterns [Farley 1990]
+            needed = max(needed, ceil(value / worth - WORTH))  # a bound, whatever the patterns [Farley 1990]
             patterns, rounds = np.vstack([patterns, more]), rounds + 1
         fewest = fewest if done else needed
-        times = np.floor(found.x + ROUNDED).astype(np.intp)
+        times = np.floor(shares + ROUNDED).astype(np.intp)
         if not times.any():  # the most of a bar, and of those the fullest
-            times[np.lexsort((patterns @ sizes, np.round(found.x, 6)))[-1]] = 1
+            times[np.lexsort((patterns @ sizes, np.round(shares, 6)))[-1]] = 1
         for pattern in np.repeat(patterns, times, axis=0):
             done.append(np.minimum(pattern, left))
             left = left - done[-1]

@@ -47,7 +47,7 @@ UNITS |= {unit: unit for unit in ("mm", "kg", "MPa", "N")}
 UNKNOWN = (np.nan, np.nan, np.nan)  # force
 FINE, OF_SHORTENING = 0.1, 20.0  # mm, of cables whose shortening is under so many steps of the other lengths
 GROWTH = 1.3  # of EI along a segment at most: half way a size that is linear, a root of EI, is less by .8 % in EI
-NOT_SAID = "to be given"  # of what a workshop has to be told and rodshell does not decide
+NOT_SAID = "to be given"  # of what a workshop has to know and rodshell does not decide
 Show = Callable[[float | None], str]
 
 

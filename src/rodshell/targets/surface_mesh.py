@@ -8,7 +8,7 @@ from rodshell.targets.nurbs import grid_triangles
 from rodshell.targets.target import Target
 from rodshell.targets.trianglemesh import turned
 
-CELLS = 64  # along the longer side of the plan
+CELLS = 52  # along the longer side of the plan
 GROWTHS = 6  # of the box in which the surface is looked for, by its half to all sides; none is shown outside
 HALVINGS = 14  # of a mesh edge that crosses the end
 

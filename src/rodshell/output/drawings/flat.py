@@ -156,7 +156,7 @@ class FlatPlan:
         for rod in self.rods:
             blank, along, end = self.blanks.get(rod.id), rod.record.stiffness, rod.length
             holes = np.array([(joint.at, joint.slot or 0.0) for joint in rod.record.joints]).reshape(-1, 2)
-            cuts, outline = np.array(rod.record.splices), [] if blank is None else blank.outline.ravel()
+            cuts, outline = np.array(rod.record.splices), np.empty(0) if blank is None else blank.outline.ravel()
             words, lengths = (along, len(holes), len(cuts)), [rod.cut_length, rod.allowance]
             sizes = np.concatenate([lengths, *holes, cuts, outline])
             turned = np.concatenate([lengths, *((end, 0.0) + (-1.0, 1.0) * holes[::-1]), end - cuts[::-1]])
