@@ -1,14 +1,13 @@
 """From a name, a file, a text or a mapping, and changed keys, to a complete case or one clear sentence."""
 
 import re
-import tomllib
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import partial
-from itertools import islice, permutations
+from itertools import permutations
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -24,12 +23,13 @@ from rodshell.case.keys import (
     unknown_path,
 )
 from rodshell.case.stage_tables import IDLE
+from rodshell.case.tables import TEXT, plain, toml_of
 from rodshell.errors import InputError
 from rodshell.quantities import Polylines, Unit
 from rodshell.rods.section import SectionKeys
 from rodshell.schema import read, value_of, written
 from rodshell.units import shown
-from rodshell.untrusted import limit, raised, read_text
+from rodshell.untrusted import read_text
 from rodshell.validation import file_path, instance, is_auto
 
 _Raw = dict[str, Any]
@@ -86,14 +86,6 @@ _UNDESCRIBED_BEFORE = (
 )
 """The one comment that earlier versions kept in place of a case with `UNDESCRIBED`."""
 
-TEXT = 2e6  # bytes of a case; tomllib takes about 1 us and 50 bytes for each
-DEEPEST = 10  # tables and lists within each other: points of a line of a load in a row take seven
-_LONGEST_KEY = 200  # characters
-_MOST_KEYS = 1000  # of one table
-_TOO_DEEP = f"tables or lists are within each other more than {DEEPEST} deep: a case has none such"
-_MANY_DOTS = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){20}""")
-"""A dotted key of more than twenty tables, for which tomllib takes memory by the square of their number."""
-
 _NOT_A_WORD = "the keys of a case are words such as target.radius, not {}"
 
 
@@ -123,7 +115,7 @@ def load_case(
         InputError: no such case or file, not TOML, an unknown key, a value that cannot be used, the case of an object
             that no case file can describe; in one sentence.
     """
-    overrides = dict(_plain(overrides or {}))
+    overrides = dict(plain(overrides or {}))
     raw = _raw_of(source)
     if UNDESCRIBED in raw:
         what = raw[UNDESCRIBED]
@@ -163,8 +155,8 @@ def changed_case(case: Case, overrides: Mapping[str, object]) -> Case:
                 f"{path} cannot be changed: it is {held[table].what}, which no key describes: make a new job of "
                 "another object"
             )
-    tables = {name: _plain(table) for name, table in written(case).items() if name not in held}
-    changed = _validated(tables, _plain(dict(overrides)))
+    tables = {name: plain(table) for name, table in written(case).items() if name not in held}
+    changed = _validated(tables, plain(dict(overrides)))
     return replace(changed, **{name: getattr(case, name) for name in held})
 
 
@@ -371,7 +363,7 @@ def _raw_of(source: "str | PathLike[str] | Mapping[str, object] | None") -> _Raw
     if source is None:
         return {}
     if isinstance(source, Mapping):
-        return _nested(_plain(source))
+        return _nested(plain(source))
     instance("the case", source, str | PathLike, "the name of a built-in case, a path, text, or a mapping")
     name = str(source)
     if not name.strip():
@@ -407,60 +399,12 @@ def _read(path: Path) -> _Raw:
 
 
 def _parsed(name: str, text: str, wrong_type: str = "") -> _Raw:
-    raw: _Raw = _plain(toml_of(name, text, wrong_type))
+    raw: _Raw = plain(toml_of(name, text, wrong_type))
     if not raw:
         for comment in _UNDESCRIBED_BEFORE:
             if found := comment.fullmatch(text.strip()):
                 return {UNDESCRIBED: found[1]}
     return raw
-
-
-def toml_of(name: str, text: str, wrong_type: str = "") -> dict[str, Any]:
-    """The tables of a text; `tomllib` is given none that it would take minutes or gigabytes for.
-
-    Args:
-        name: of the text, for messages.
-        wrong_type: what is wrong with a file of this name, if anything.
-
-    Raises:
-        InputError: it is too large, or no TOML.
-    """
-    if len(text) > limit(TEXT):
-        raise InputError(f"{name} has more than {limit(TEXT) / 1e6:g} MB: shorten it, {raised(TEXT, len(text))}")
-    if _MANY_DOTS.search(text):
-        raise InputError(f"{name} has a key of more than twenty tables: the keys of a case have three at most")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as reason:
-        raise InputError(f"{name}: {wrong_type}" if wrong_type else f"{name} is not valid TOML: {reason}") from None
-    except ValueError:  # of Python's int
-        raise InputError(f"{name} has an integer of thousands of digits: write numbers such as 0.2 or 1e6") from None
-    except RecursionError:
-        raise InputError(_TOO_DEEP) from None
-
-
-def _plain(value: Any, depth: int = 0) -> Any:
-    """A value as TOML gives it, NumPy's arrays as lists.
-
-    Raises:
-        InputError: tables and lists within each other, or keys, beyond what any case has: they would cost minutes.
-    """
-    if depth > DEEPEST:
-        raise InputError(_TOO_DEEP)
-    if hasattr(value, "dtype") and not isinstance(value, type):
-        value = value.tolist()
-    if isinstance(value, Iterator):
-        value = tuple(islice(value, _MOST_KEYS + 1))
-    if isinstance(value, list | tuple):
-        items = (_plain(item, depth + 1) for item in value)
-        return tuple(items) if isinstance(value, tuple) else [*items]
-    if not isinstance(value, Mapping):
-        return value
-    if len(value) > _MOST_KEYS:
-        raise InputError(f"a table has {len(value)} keys; at most {_MOST_KEYS} are read: leave some out")
-    if long := next((key for key in value if isinstance(key, str) and len(key) > _LONGEST_KEY), None):
-        raise InputError(f"unknown key {shown(long)}: it has {len(long)} characters")
-    return {key: _plain(item, depth + 1) for key, item in value.items()}
 
 
 def _nested(mapping: Mapping[str, object]) -> _Raw:

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from rodshell.case import BUILT_IN
-from rodshell.case.load import flattened, toml_of
+from rodshell.case.load import flattened
+from rodshell.case.tables import toml_of
 from rodshell.errors import InputError
 from rodshell.figures.findings import CODES
 from rodshell.job import Job
