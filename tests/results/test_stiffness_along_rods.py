@@ -96,7 +96,8 @@ def test_second_laths_are_in_the_stock_plan_and_in_every_total(tmp_path):
     rods, sections, bars = (
         list(csv.DictReader((folder / "schedule" / f"{name}.csv").open())) for name in ("rods", "sections", "stock")
     )
-    pieces = [piece.split() for bar in bars for piece in bar["pieces_mm"].split("; ")]
+    pieces = [(mark, cut) for row in bars for bar in row["marks"].split("; ")
+              for mark, cut in zip(bar.split(" + "), row["pieces_mm"].split("; "), strict=True)]  # fmt: skip
     first, second = (
         {rod["id"]: sum(float(cut) for name, cut in pieces if name.split(".")[0] == rod["id"] + lath) for rod in rods}
         for lath in ("", "-2")
