@@ -1,7 +1,8 @@
 """Words that the project does not use, and what it says instead: `python .ci/words.py`; exit 1 where one is used.
 
 Identifiers are looked for in the syntax trees of src/ and examples/, phrases in their texts and comments, and in
-README.md and docs/*.md. A line that quotes a retired word on purpose ends with the comment `# retired word`.
+README.md, docs/*.md and docs/theory/*.md. A line that quotes a retired word on purpose ends with the comment
+`# retired word`.
 """
 
 import ast
@@ -74,7 +75,7 @@ MODULES = {
 }
 # Regular expressions, read without regard to case, a blank standing for any white space.
 PHRASES = {
-    r"\bnumerics\.md\b": "docs/theory.md, docs/equations.md or the published source",
+    r"\bnumerics\.md\b": "docs/theory/, docs/equations.md or the published source",
     r"\bways? up\b": "deployment",
     r"\b(tell|tells|told)\b(?! (the|a|you|us|him|her) )": "says, shows, distinguishes; passed",
     r"\b(bear|bears|bearing|borne)\b": "carries, withstands, allows",
@@ -180,7 +181,8 @@ def words_in(path: Path) -> Iterator[tuple[int, str, str]]:
 def files() -> list[Path]:
     code = [path for folder in ("src", "examples") for path in sorted((ROOT / folder).rglob("*.py"))]
     templates = sorted((ROOT / "src").rglob("*.j2"))
-    return [*code, *templates, ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    pages = [page for folder in ("docs", "docs/theory") for page in sorted((ROOT / folder).glob("*.md"))]
+    return [*code, *templates, ROOT / "README.md", *pages]
 
 
 def room(path: Path) -> str:

@@ -9,6 +9,7 @@ from docutils.nodes import SkipNode, Text
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
+from sphinx.util.math import get_node_equation_number
 
 DOCS = Path(__file__).parent
 LOADED = re.compile(r"<(?:script|link|img|iframe)[^>]*\b(?:src|href)=\"(?:https?:)?//[^\"]*")
@@ -28,6 +29,7 @@ smartquotes = False  # values in quotation marks are copied
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 4
+numfig = True  # equations are numbered by chapter: math_numfig
 suppress_warnings = ["config.cache"]
 
 BUILT_EXAMPLES = DOCS.parent / "build" / "examples"
@@ -117,7 +119,9 @@ def _inline(self, node) -> None:
 
 
 def _block(self, node) -> None:
-    self.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    number = f'<span class="eqno">({get_node_equation_number(self, node)})</span>' if node["number"] else ""
+    formula = convert(node.astext(), display="block")
+    self.body.append(f"{self.starttag(node, 'div', CLASS='math')}{formula}{number}</div>")
     _skip()
 
 

@@ -140,7 +140,7 @@ def test_joints_may_differ_from_place_to_place():
 
 
 def test_a_gravity_drape_with_pins_ends_where_one_with_balls_does():
-    """Pins turn freely about the normal, and the rods hardly twist (docs/theory.md, The gravity drape)."""
+    """Pins turn freely about the normal, and the rods hardly twist (docs/theory/drape.md, The gravity drape)."""
     layout = rs.GridLayout.orthogonal(rods=(7, 7), spacing=SPACING, length=0.9, edge=0.0126)
     lengths = []
     for joint in (rs.Ball(), rs.Pin()):

@@ -1,6 +1,6 @@
 """Rod ends of the net against the similarity equation on the sphere and a slow twin (`goursat`) elsewhere.
 
-All lengths in metres. Rod ends are to be accurate to 0.02 mm (docs/theory.md); each tolerance here is
+All lengths in metres. Rod ends are to be accurate to 0.02 mm (docs/theory/nets.md); each tolerance here is
 about three times what was measured, so that a loss of order shows.
 """
 
@@ -171,7 +171,7 @@ def test_sphere_end_that_does_not_exist_is_refused(offset, base, sentence):
         sphere_net_end(R, offset, base)
 
 
-# Rod ends: the table of docs/theory.md, The inextensible net
+# Rod ends: the table of docs/theory/nets.md, Accuracy
 # Rod ends, computed once by the similarity equation and by `goursat` with steps halved until they settle
 
 TABLES = {

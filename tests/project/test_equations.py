@@ -22,7 +22,7 @@ NAMED = re.compile(r"`([\w/]+\.py): ([\w.]+)`")
 
 def test_every_numbered_equation_has_its_row_in_the_papers_order() -> None:
     assert [row[0] for row in ROWS][: len(NUMBERED)] == NUMBERED
-    assert all(len(row) == 5 for row in ROWS)
+    assert all(len(row) == 6 for row in ROWS)
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[f"{row[0]} {row[1][:30]}" for row in ROWS])

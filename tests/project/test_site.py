@@ -127,3 +127,39 @@ def test_every_row_of_the_acceptance_tables_is_on_the_page_of_verification_and_m
     )
     assert "| bow | thrust \\| off | 0.01 N | 0.02 N |" in page
     assert "| arch | rise | 3 (missed) | 2 |" in page
+
+
+THEORY = sorted((Path(__file__).parents[2] / "docs" / "theory").glob("*.md"))
+LABELLED = re.compile(r"^\$\$\n(.+?)\n\$\$ \(([a-z0-9-]+)\)$", re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("page", THEORY, ids=lambda page: page.stem)
+def test_every_displayed_equation_of_the_theory_has_the_label_by_which_it_is_numbered(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    found = LABELLED.findall(text)
+    assert text.count("$$") == 2 * len(found)
+    assert found or page.stem == "index"
+
+
+@pytest.mark.parametrize("page", THEORY, ids=lambda page: page.stem)
+def test_no_formula_of_the_theory_has_a_command_that_mathml_does_not_know(page: Path) -> None:
+    convert = pytest.importorskip("latex2mathml.converter", reason="needs the extra [docs]").convert
+    text = page.read_text(encoding="utf-8")
+    inline = re.findall(r"\$([^$]+)\$", re.sub(r"\$\$.*?\$\$", "", text, flags=re.DOTALL))
+    for formula in [*(formula for formula, _ in LABELLED.findall(text)), *inline]:
+        assert not re.search(r"\\|<mi>&</mi>", convert(formula)), formula
+
+
+def test_labels_of_equations_are_unique_and_those_referred_to_exist() -> None:
+    labels = [label for page in THEORY for _, label in LABELLED.findall(page.read_text(encoding="utf-8"))]
+    assert len(labels) == len(set(labels)) > 100
+    docs = THEORY[0].parents[1]
+    for page in docs.rglob("*.md"):
+        for label in re.findall(r"\{eq\}`([^`]+)`", page.read_text(encoding="utf-8")):
+            assert label in labels, (page.name, label)
+
+
+def test_every_chapter_of_the_theory_is_in_its_index() -> None:
+    index = next(page for page in THEORY if page.stem == "index").read_text(encoding="utf-8")
+    for page in THEORY:
+        assert page.stem == "index" or (f"]({page.name})" in index and f"\n{page.stem}\n" in index), page.name

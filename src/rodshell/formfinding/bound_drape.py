@@ -1,4 +1,4 @@
-"""The bound drape: march the net, then bind the elastic grid to the target (docs/theory.md, The bound drape).
+"""The bound drape: march the net, then bind the elastic grid to the target (docs/theory/drape.md, The bound drape).
 
 Every node slides on the target without friction, rods do not stretch, and bending alone determines what the net
 leaves open: the shape of each span between its joints. Out of the surface the rods follow its curvature; their

@@ -3,7 +3,7 @@
 From the flat grid, on nested meshes. One joint, the anchor, is held in x and y, and a neighbour keeps its heading:
 otherwise the draped grid would at once slide or turn away without friction. Even so the state may be a saddle; the
 negative modes of its exact Hessian show it. As the rods stretch, the footprint is smaller than that of the inextensible
-net: a physical effect, which grows with the weight over the stretch stiffness (docs/theory.md, The gravity drape).
+net: a physical effect, which grows with the weight over the stretch stiffness (docs/theory/drape.md).
 
 The fall drape uses the initial placement, the flat grid over the target, and the test whether it stays there, too.
 """
