@@ -16,7 +16,7 @@ from rodshell.output.pictures import View, picture
 from rodshell.output.png import drawing_png
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-LONG = ("gallery",)  # shown, but not run: they take minutes
+LONG = ("gallery", "under_snow")  # shown, but not run: they read files, and take minutes
 HEAD = """Examples
 ========
 
