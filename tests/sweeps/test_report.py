@@ -10,6 +10,7 @@ import pytest
 import rodshell as rs
 from rodshell.case.link import studio_link
 from rodshell.sweeps.plan import read_plan
+from rodshell.sweeps.report import _with_values
 from tests.output.browser import CHROMIUM, browser_options, needs_browser
 from tests.sweeps.test_search import plan
 from tests.sweeps.test_sweep import BASE
@@ -107,3 +108,16 @@ def test_the_studio_is_started_with_the_file_that_the_designs_need(tmp_path: Pat
     command = read_plan(tmp_path / "sweep.toml").origin.studio_command
     assert shlex.split(command) == ["rodshell", "studio", str(tmp_path / "my roof.toml")]
     assert read_plan({"base": "hemisphere", "axes": axes}).origin.studio_command == "rodshell studio"
+
+
+@pytest.mark.parametrize(
+    ("first", "shown"),
+    [(("n", "rms_pinned"), ["n", "rms_clamped"]), (("n", "rms_clamped"), ["n", "rms_clamped"]),
+     (("rms_pinned", "rms_given"), ["rms_clamped", "total_length"])],
+)  # fmt: skip
+def test_a_page_opens_on_columns_that_have_values(first: tuple[str, str], shown: list[str]) -> None:
+    columns = {
+        "n": [1, 2], "verdict": ["good", "good"], "rms_pinned": [None, None], "rms_clamped": [None, 0.1],
+        "rms_given": [None, None], "total_length": [3.0, 4.0],
+    }  # fmt: skip
+    assert _with_values(first, columns) == shown

@@ -152,3 +152,35 @@ def test_the_example_is_valid():
 def test_what_cannot_be_searched_is_refused_in_a_sentence(changes: dict[str, Any], sentence: str):
     with pytest.raises(rs.InputError, match=sentence):
         read_search(plan(**changes))
+
+
+@pytest.mark.slow
+def test_where_objectives_need_no_checks_the_best_designs_alone_get_them(tmp_path: Path) -> None:
+    searched = plan(run={})
+    assert read_search(searched).settings.until == "pop-up"
+    found = rs.optimise(searched, tmp_path / "out")
+    front = {row["job"]: row["verdict"] for row in rows_of(tmp_path / "out" / "front.csv")}
+    assert front
+    assert all(front.values())
+    assert 0 < len(front) < found.designs
+    assert found.computed == found.designs + len(front)
+    assert rs.optimise(searched, tmp_path / "out").computed == 0
+    before = rs.optimise(plan(), tmp_path / "popped")
+    assert [design["rms_pinned"] for design in before.front] == [design["rms_pinned"] for design in found.front]
+    judged = [row["verdict"] for row in rows_of(tmp_path / "out" / "table.csv")]
+    assert sum(map(bool, judged)) == len(front)
+
+
+@pytest.mark.parametrize(
+    ("changes", "until"),
+    [
+        ({"constraints": {"verdict": ["good", "check"]}}, "fabrication"),
+        ({"objectives": {"minimise": ["bending.pop_up.max_stress"]}}, "fabrication"),
+        ({"constraints": {"drape.max_gap": {"max": 1e-3}}}, "pop-up"),
+        ({"run": {"until": "fabrication"}}, "fabrication"),
+    ],
+)
+def test_a_search_computes_what_its_objectives_and_constraints_need(changes: dict[str, Any], until: str) -> None:
+    found = read_search(plan(**{"run": {}, **changes}))
+    assert found.settings.until == until
+    assert found.checks_last == (until == "pop-up")

@@ -22,7 +22,14 @@ STANDARD = (*TEXTS, *NUMBERS)
 JOB = "job"  # its identity, by which its result folder is called
 CONVERGED = "converged"
 ANY = "NAME"  # in a table whose keys are the user's, such as load combinations
+OF_POP_UP = ("agreement", "drape", "joint", "layout", "net", "pop_up", "refinement", "rod", "target")
+"""Tables of result.json that are complete when the shell is popped up."""
 SHORT = 3  # a list with so many numbers is kept: a point, a pair
+
+
+def known_when_popped_up(name: str) -> bool:
+    """Whether a column needs no checks."""
+    return name in NUMBERS or name.partition(".")[0] in ("status", *OF_POP_UP)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -20,6 +20,7 @@ from rodshell.sweeps.table import CSV, PARQUET, Table, write_parquet
 from rodshell.sweeps.watched import Reply
 
 _COPY = "sweep.toml"
+CHECKED = "fabrication"  # the stage after all checks
 _LOOK = 0.2  # s between two calls of progress
 
 
@@ -30,12 +31,14 @@ class Wanted:
     Args:
         archive: the folder for its files; None: they are not wanted.
         again: whether it is run even if it is finished.
+        until: its last stage; None: that of the plan.
     """
 
     id: str
     job: Job
     archive: Path | None = None
     again: bool = False
+    until: str | None = None
 
 
 class Computation:
@@ -90,8 +93,17 @@ class Computation:
 
     def archived(self, jobs: Sequence[str]) -> list[Wanted]:
         """Finished jobs, in this order, wanted with their result folders in archives/."""
+        return [self.wanted(job, kept=True) for job in self._finished(jobs)]
+
+    def checked(self, jobs: Sequence[str]) -> list[Wanted]:
+        """Finished jobs that have no verdict, wanted with all checks."""
+        unchecked = [job for job in jobs if not self.store.row(job).get("verdict")]
+        found = (self.wanted(job, kept=False) for job in self._finished(unchecked))
+        return [replace(each, again=True, until=CHECKED) for each in found]
+
+    def _finished(self, jobs: Sequence[str]) -> list[Job]:
         keys = {design.job: design.keys for design in self.store.finished() if design.job in jobs}
-        return [self.wanted(self._plan.job(keys[job]), kept=True) for job in jobs]
+        return [self._plan.job(keys[job]) for job in jobs]
 
     def is_finished(self, wanted: Wanted) -> bool:
         """Whether nothing has to be computed for a job."""
@@ -103,7 +115,7 @@ class Computation:
     def _task(self, wanted: Wanted) -> dict[str, Any]:
         return {
             "case": wanted.job.to_toml(),
-            "until": self._plan.settings.until,
+            "until": wanted.until or self._plan.settings.until,
             "archive": None if wanted.archive is None else str(wanted.archive.absolute()),
             "version": program_version(),
         }

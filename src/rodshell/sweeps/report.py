@@ -4,7 +4,7 @@ The charts are plotly's; the page holds its library, the table once, and picture
 """
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from rodshell.errors import InputError, needs_package
 from rodshell.output.pictures import picture_svg
 from rodshell.output.svg import inline
 from rodshell.results import read
-from rodshell.sweeps.columns import JOB
+from rodshell.sweeps.columns import JOB, NUMBERS
 from rodshell.sweeps.plan import GENERATION, Plan
 from rodshell.sweeps.store import ARCHIVES, FOUND, Finished, Store, replaced
 from rodshell.sweeps.table import Sheet, in_short, plain
@@ -93,12 +93,19 @@ def _data(store: Store, page: Page) -> dict[str, Any]:
         rows.append(cells)
     columns = {name: [plain(cells[name]) for cells in rows] for name in sheet.names if name != JOB}
     return {
-        "keys": sheet.keys, "rows": columns, "first": list(page.first), "larger": list(page.larger),
+        "keys": sheet.keys, "rows": columns, "first": _with_values(page.first, columns), "larger": list(page.larger),
         "usable": [k for k, (_, counts, _) in enumerate(designs) if counts],
         "reports": [job and _report(store, job) for job, _, _ in designs],
         "studio": [_studio(page.plan, values) for _, _, values in designs],
         "commands": [page.plan.command(values) for _, _, values in designs],
     }  # fmt: skip
+
+
+def _with_values(first: Sequence[str], columns: Mapping[str, Sequence[Any]]) -> list[str]:
+    """The columns that are shown first, in place of those without a number the next that have some."""
+    filled = [name for name, cells in columns.items() if any(isinstance(cell, int | float) for cell in cells)]
+    others = iter([name for name in (*NUMBERS, *filled) if name in filled and name not in first])
+    return [name if name in filled else next(others, name) for name in first]
 
 
 def _report(store: Store, job: str) -> str | None:

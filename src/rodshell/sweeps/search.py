@@ -103,7 +103,12 @@ def optimise(
         store.plan((), notes=header_notes(plan.keys, plan.columns))
         for generation in range(1, plan.generations + 1):
             _generation(plan, generation, algorithm, computation)
-        computed, front, feasible = computation.computed, *front_of(plan, store)
+        front, feasible = front_of(plan, store)
+        if plan.checks_last:
+            unchecked = computation.checked([design.job for design in front])
+            computation.compute(unchecked, "checks of the best designs", len(unchecked))
+            front, feasible = front_of(plan, store)
+        computed = computation.computed
         best = [design.job for design in front]
         shapes = _some(best, SHAPES) if report else []
         kept = best if plan.settings.keep == "best" else shapes

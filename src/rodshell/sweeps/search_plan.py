@@ -1,7 +1,7 @@
 """The plan of a search: base, variables, objectives and constraints, read from a TOML file or a mapping."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -10,7 +10,15 @@ from rodshell.arrays import Floats
 from rodshell.errors import InputError
 from rodshell.figures.findings import CODES
 from rodshell.sweeps.axes import Axis, Span, count_of, flat_keys, read_listed, read_span
-from rodshell.sweeps.columns import FINDINGS, NUMBERS, STANDARD, number_of, read_column, read_columns
+from rodshell.sweeps.columns import (
+    FINDINGS,
+    NUMBERS,
+    STANDARD,
+    known_when_popped_up,
+    number_of,
+    read_column,
+    read_columns,
+)
 from rodshell.sweeps.plan import GENERATION, Plan, Source, known, read_origin, read_settings, table
 from rodshell.units import shown
 from rodshell.validation import choices_of
@@ -60,7 +68,11 @@ class Constraint:
 
 @dataclass(frozen=True)
 class SearchPlan(Plan):
-    """A whole search; its keys are "generation" and those of its variables, which are intervals or lists of values."""
+    """A whole search; its keys are "generation" and those of its variables, which are intervals or lists of values.
+
+    Args:
+        checks_last: objectives and constraints need no checks, which the best designs alone get, at the end.
+    """
 
     variables: tuple[Span | Axis, ...]
     objectives: tuple[Objective, ...]
@@ -68,6 +80,7 @@ class SearchPlan(Plan):
     population: int
     generations: int
     seed: int
+    checks_last: bool
 
     def values(self, generation: int, point: Floats) -> tuple[Any, ...]:
         """Values of the keys at a point (n,) of the unit cube."""
@@ -105,10 +118,13 @@ def read_search(source: Source) -> SearchPlan:
     if "without" in run:
         raise InputError("run.without: a search has constraints: give findings = { without = [...] } there")
     known("search", search, tuple(COUNTS))
+    settings = read_settings(run, [column.name for column in columns])
+    checks_last = "until" not in run and all(map(known_when_popped_up, judged))
     plan = SearchPlan(
-        origin, keys, columns, read_settings(run, [column.name for column in columns]),
+        origin, keys, columns, replace(settings, until="pop-up") if checks_last else settings,
         variables, objectives, constraints,
         *(count_of(f"search.{name}", search.get(name, default), least) for name, (default, least) in COUNTS.items()),
+        checks_last,
     )  # fmt: skip
     for corner in (0.0, 0.5, 1.0):
         plan.job(plan.values(1, np.full(len(variables), corner)))
