@@ -123,7 +123,10 @@ def read_search(source: Source) -> SearchPlan:
     plan = SearchPlan(
         origin, keys, columns, replace(settings, until="pop-up") if checks_last else settings,
         variables, objectives, constraints,
-        *(count_of(f"search.{name}", search.get(name, default), least) for name, (default, least) in COUNTS.items()),
+        **{
+            name: count_of(f"search.{name}", search.get(name, default), least)
+            for name, (default, least) in COUNTS.items()
+        },
         checks_last=checks_last,
     )  # fmt: skip
     for corner in (0.0, 0.5, 1.0):
