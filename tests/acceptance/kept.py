@@ -72,6 +72,7 @@ CHANGED_ON_PURPOSE: dict[str, str] = {
     "bumps.states.acting_*": _NEW,
     "bumps.fabrication.cable_*": _NEW,
     "*.layout.kind": _NEW,
+    "*.case.refine.offer": "the key is gone",
     "*.states.target_*": "the whole target is shown",
     "freeform.rods[[]*[]].splice_*": _NEW,
     "freeform.fabrication.stock.fewest": "a bound by what can be cut from bars, not by the total length",
