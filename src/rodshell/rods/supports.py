@@ -97,7 +97,8 @@ class Support:
         return ()
 
     def energies(self, ends: Ints, points: Floats) -> "Sequence[Elements]":
-        """What acts on the ends, such as the energies of springs.
+        """What acts on the ends, such as the energies of springs; those with `times(factor)`, which gives them so many
+        times as stiff, are followed over years of creep too.
 
         Args:
             ends: (2m,) number of the node of each rod end.
