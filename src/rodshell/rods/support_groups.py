@@ -130,8 +130,8 @@ class _Group:
         return tuple(np.eye(3))
 
     def against(self) -> Floats:
-        """(k, 3) directions along which something always acts against it: these alone must keep the shell from moving as
-        a whole."""
+        """(k, 3) directions along which something always acts against it; these alone must keep the shell from moving
+        as a whole."""
         return np.zeros((0, 3))
 
 
