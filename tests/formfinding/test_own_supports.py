@@ -61,7 +61,7 @@ def test_stiff_posts_are_pins_and_soft_ones_store_what_the_rods_lose(form):
 
 
 def test_checks_summary_and_result_know_the_support_by_its_name(form, tmp_path):
-    form.save(tmp_path / "dome")
+    form.save(tmp_path / "dome", kinds="report, obj")
     archive = rs.read(tmp_path / "dome")
     results = archive.results
     for table in (results.pop_up, results.agreement, results.reactions, results.joint_loads, results.self_weight):
