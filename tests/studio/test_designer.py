@@ -208,6 +208,7 @@ def test_a_designer_sees_and_changes_rods_loads_and_lattice_on_every_screen(visi
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("visit", [("screen", "light"), ("phone", "dark")], indirect=True, ids="-".join)
 @needs_browser
 def test_the_view_fits_after_each_change_of_the_target_and_stays_otherwise(visit: Visit) -> None:
     page, _ = visit
@@ -231,6 +232,7 @@ def test_the_view_fits_after_each_change_of_the_target_and_stays_otherwise(visit
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("visit", [("screen", "light"), ("phone", "dark")], indirect=True, ids="-".join)
 @needs_browser
 def test_settings_are_named_in_words_and_found_by_them(visit: Visit) -> None:
     page, _ = visit
