@@ -74,7 +74,7 @@ def job(name: str) -> rs.Job:
 
 
 def factors_of(name: str) -> dict[str, tuple[float, float]]:
-    """By combination, how many times a shell carries it, and what it uses of its strength."""
+    """By combination, how many times a shell carries it, and what rods or bracing use of their strength."""
     asked = job(name)
     loads = asked.case.built_loads()
     assert loads is not None
@@ -85,8 +85,11 @@ def factors_of(name: str) -> dict[str, tuple[float, float]]:
         years = shell.after_years
         factors = [shell.limit_factor, shell.imperfect_factor]
         factors += [years.limit_factor, years.imperfect_factor] if years else []
-        assert "not followed" not in (shell.limit_kind, shell.imperfect_kind), name
-        found[combination] = min(f for f in factors if f is not None), shell.utilisation or 0.0
+        kinds = [shell.limit_kind, shell.imperfect_kind]
+        kinds += [years.limit_kind, years.imperfect_kind] if years else []
+        assert "not followed" not in kinds, f"{name}: {kinds}"
+        used = max(shell.utilisation or 0.0, shell.bracing_utilisation or 0.0)
+        found[combination] = min(f for f in factors if f is not None), used
     return found
 
 
