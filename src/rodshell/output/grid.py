@@ -276,8 +276,8 @@ def holes_text(archive: Archive) -> str:
     made = archive.results.fabrication
     if made is not None and made.slot_depth:
         return ""
-    given = tomllib.loads(archive.case_toml).get("strength", {}).get("hole")
-    return f"holes {f'{1e3 * given:g} mm' if isinstance(given, float) else given or 'to be given'}"
+    given = tomllib.loads(archive.case_toml).get("strength", {}).get("hole") or "to be given"
+    return f"holes {given if isinstance(given, str) else f'{1e3 * given:g} mm'}"
 
 
 def supported(state: str, *more: str) -> str:
