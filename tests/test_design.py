@@ -212,6 +212,7 @@ def test_rods_are_set_closer_only_while_that_helps_a_shell_that_falls_under_its_
     search = design.Search(asked, lambda case, earlier: form, lambda *said: None, lambda sentence: None)
     tried = [each for each in search._grids() if search._stands(*each) is None]
     assert (len({spacing for spacing, _ in tried}) > 2) == helps
+    assert "falls under its own weight before it is braced" in search._limits()
 
 
 @pytest.mark.parametrize(

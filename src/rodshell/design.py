@@ -315,8 +315,10 @@ class Search:
             if section.depth > self.deepest:
                 return f"strength while it is erected allows {size}, {asked_for}: erect it in another way{also}"
             return f"room for joints, a tenth of the spacing, allows {size}, {asked_for}{also}"
-        most = rounded_down(self.best_factor)
-        short = f"carries {most} of the {rounded(self.reserve)} times that are asked for"
+        short = "falls under its own weight before it is braced"
+        if self.best_factor > 0:
+            most = rounded_down(self.best_factor)
+            short = f"carries {most} of the {rounded(self.reserve)} times that are asked for"
         if sharp is best:
             return f"stability: {size} {short}{also}"
         thicker = "thicker ones that are sold would use more than their strength there"
