@@ -326,6 +326,7 @@ def test_holes_for_the_ends_of_a_model_can_be_drilled_through_its_support_plan()
     ends = 1e3 * shell.positions[shell.shell.mesh.ends.reshape(-1), :2]
     parts = [sheet for sheet in sheets(made) if sheet.title.startswith("Support plan 1:1, part ")]
     assert len(parts) > 4
+    assert not [sheet for sheet in sheets(archive("dome")) if sheet.title.startswith("Support plan 1:1, part ")]  # A3
     met = set[int]()
     for part in parts:
         circles = np.array([mark.at for mark in part.marks])
